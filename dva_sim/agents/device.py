@@ -49,7 +49,7 @@ def urgent(message: m.Message) -> bool:
 
 
 def do_nothing(*_: object) -> None:
-    """For callers who need no answer."""
+    """Do nothing, for callers that need no answer."""
 
 
 @dataclass(kw_only=True)
@@ -341,7 +341,7 @@ class AgentDevice:
             self._requester(peer, urgent).open()
 
     def be_patient(self, timeout: float) -> None:
-        """From now on wait so long for each answer [s]."""
+        """Wait so long for each answer from now on [s]."""
         self.timeout = timeout
         for requester in self._requesters.values():
             requester.timeout = timeout
@@ -354,13 +354,13 @@ class AgentDevice:
                 requester.give_up()
 
     def forget(self, peer: str) -> None:
-        """A peer is there no more: what it was asked has failed."""
+        """Forget a peer that has gone: its open requests fail."""
         self.give_up(peer)
         self._addresses.pop(peer, None)
         self.network.forget(peer)
 
     def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
-        """The reply in `data`, if it is one, from the device asked, to this very request."""
+        """Return the reply in `data`, if it is one, from the device asked, to this very request."""
         answer = self.read(data, message.destination)
         if answer is None or not isinstance(answer.body, m.Reply):
             return None
@@ -370,7 +370,7 @@ class AgentDevice:
         return answer.body
 
     def _meet(self, peer: str, reply: m.Reply) -> None:
-        """The DVA introduces a device to those that it may act on."""
+        """Introduce the devices that the DVA lets this one act on, or be acted on by."""
         content = reply.content
         if peer == self.dva and isinstance(content, m.Permission) and content.address is not None:
             self.introduce(content.device, content.address)
@@ -399,7 +399,7 @@ class AgentDevice:
             self.conclude(request, message, handler)
 
     def admit(self, request: Request) -> m.Message | None:
-        """The message of a request, if it is one, and for this device.
+        """Return the message of a request, if it is one, and for this device.
 
         Invalid messages are refused at once, at no cost but that of reading. A sender of little
         else gets no replies, and then is not read (`Nuisances`). A possible emergency always is.
@@ -477,7 +477,7 @@ class AgentDevice:
         request.answer(reply)
 
     def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
-        """The refusal of a message that speaks for another device than its key is of.
+        """Return the refusal of a message that speaks for another device than its key is of.
 
         An emergency is obeyed all the same: it can only stop.
         """
@@ -487,13 +487,16 @@ class AgentDevice:
         return m.Reply(message.message_id, m.NOT_PERMITTED, f"this is the key of {sender}")
 
     def _misdirection(self, message: m.Message) -> m.Reply | None:
-        """The refusal of a message to another device; anybody's emergency is everybody's."""
+        """Return the refusal of a message to another device; anybody's emergency is everybody's."""
         if message.destination == self.id_tag or urgent(message):
             return None
         return m.Reply(message.message_id, m.UNKNOWN_DEVICE, f"this is {self.id_tag}")
 
     def reply(self, message: m.Message, body: m.Reply) -> bytes:
-        """A reply to `message` as bytes; one that no message can hold keeps its code alone."""
+        """Return a reply to `message` as bytes.
+
+        One that no message can hold keeps its code alone.
+        """
         session = message.session or 0
         now = self.clock.now
         try:
@@ -504,7 +507,10 @@ class AgentDevice:
             return self.outbox.encode(message.source, short, now, session)
 
     def read(self, data: bytes, source: str | None = None) -> m.Message | None:
-        """A message from bytes; None, and counted, if it is not valid or not from `source`."""
+        """Return a message from bytes.
+
+        None, and counted, if it is not valid or not from `source`.
+        """
         try:
             message = decode(data)
         except ProtocolError:
@@ -562,7 +568,7 @@ class AgentDevice:
         self.recorder.tell(self.clock.now, self.label, what, kind)
 
     def label_of(self, id_tag: str) -> str:
-        """The name of a device for people."""
+        """Return the name of a device for people."""
         return self.labels.get(id_tag, id_tag)
 
     def _heartbeat(self, life: int) -> bool:
@@ -613,5 +619,8 @@ class AgentDevice:
 
 
 def command_topic(robot: str) -> str:
-    """Topic of the commands for a robot; the bar ends it, so that no topic begins another."""
+    """Return the topic of the commands for a robot.
+
+    The bar ends it, so that no topic begins another.
+    """
     return f"{robot}|"

@@ -85,12 +85,12 @@ class CameraFrame(NamedTuple):
     captured: float
 
     def pack(self, size: int) -> bytes:
-        """The frame as JSON, filled up with spaces to the size of a picture [B]."""
+        """Return the frame as JSON, filled up with spaces to the size of a picture [B]."""
         return json.dumps((self.observation, self.captured)).encode().ljust(size)
 
     @classmethod
     def unpack(cls, data: bytes) -> CameraFrame | None:
-        """The frame in `data`; None if there is none."""
+        """Return the frame in `data`; None if there is none."""
         try:
             (*values, hazards, visibility), captured = json.loads(data)
             tick, *pose = (float(value) for value in values)
@@ -116,7 +116,7 @@ make_frame = maker(CameraFrame)
 
 
 def _hazard(kind: object, *numbers: float) -> SeenHazard:
-    """A hazard out of a message that may be anything.
+    """Return a hazard out of a message that may be anything.
 
     Raises:
         ValueError: what is no finite number.
@@ -140,7 +140,7 @@ class Cameras(NamedTuple):
 
 
 def topic_in(url: str) -> str | None:
-    """The topic of frames that a URL of ours ends with."""
+    """Return the topic of frames that a URL of ours ends with."""
     return url.rpartition("/")[2] if url.startswith(CAMERA_SCHEME) else None
 
 
@@ -149,5 +149,5 @@ OVER_ZMQ = Cameras(lambda label, address: f"{CAMERA_SCHEME}{address}/{FRAME}", t
 
 
 def no_smoke(a: Point, b: Point) -> float:
-    """The optical depth where nothing burns."""
+    """Return the optical depth where nothing burns."""
     return 0.0

@@ -34,7 +34,7 @@ class Trait(Config):
     spread: Spread = 0.0
 
     def draw(self, rng: np.random.Generator) -> float:
-        """One person's value."""
+        """Return one person's value."""
         return float(self.median * np.exp(self.spread * rng.normal()))
 
 
@@ -200,7 +200,7 @@ class Person:
 
 
 def draw_person(population: Population, seed: int, index: int) -> Person:
-    """Person number `index` of the population that `seed` draws: always the same one."""
+    """Return the person number `index` of the population that `seed` draws: always the same one."""
     rng = Streams(seed).fresh(f"person-{index}")
     drawn = {name: trait.draw(rng) for name, trait in population.traits.items()}
     drawn["pace"] = min(1.0, drawn["pace"])
@@ -209,6 +209,6 @@ def draw_person(population: Population, seed: int, index: int) -> Person:
 
 
 def median_person(population: Population) -> Person:
-    """The person in the middle of a population: every trait at its median."""
+    """Return the person in the middle of a population: every trait at its median."""
     still = {name: Trait(median=trait.median) for name, trait in population.traits.items()}
     return draw_person(population.model_copy(update=still), 0, 0)

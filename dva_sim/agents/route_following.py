@@ -108,7 +108,9 @@ class _Line:
         self._found = self.begin
 
     def next_place(self, last: _Place, x: float, y: float, reach: float) -> _Place:
-        """The place of who is here [m] and was at another; found once for all who ask together.
+        """Return the place of who is here [m] and was at another.
+
+        Found once for all who ask together.
 
         Args:
             last: Previous place.
@@ -122,7 +124,7 @@ class _Line:
         return self._found
 
     def _nearest(self, last: _Place, x: float, y: float, reach: float) -> _Place:
-        """Nearest place on the line; see `next_place`.
+        """Return the nearest place on the line; see `next_place`.
 
         The way along a route is no shorter than the straight one: who is so much farther from a
         place on it than from the nearest one need not look at what comes within as much behind it.
@@ -217,7 +219,7 @@ class Route:
         return _make_ahead(bearing, distance, self.length - place.along, place.offset)
 
     def remaining(self, x: float, y: float) -> float:
-        """Way left from the place on the route where one is who is here [m], as `ahead` tells."""
+        """Return the way left [m] from the place on the route nearest to here, as `ahead` tells."""
         return self.length - self._go_to(x, y).along
 
     def advance(self, x: float, y: float) -> None:
@@ -225,14 +227,14 @@ class Route:
         self._go_to(x, y)
 
     def _go_to(self, x: float, y: float) -> _Place:
-        """One's place on the route who is here now [m]."""
+        """Return one's place on the route who is here now [m]."""
         place = self._place
         if x != place.x or y != place.y or place.offset == math.inf:
             self._place = place = self._line.next_place(place, x, y, self._reach)
         return place
 
     def point_at(self, along: float) -> tuple[float, float]:
-        """The place a given way along the route [m]; beyond its end, the end."""
+        """Return the place a given way along the route [m]; beyond its end, the end."""
         at = self._line.at
         legs = self._line.legs
         i = bisect_right(at, along, 0, len(legs)) - 1
@@ -293,7 +295,7 @@ SHORTEST = 1e-3  # design: a delay, or a share of noise, below this counts as th
 
 
 def gain_at(limit: float, margin: float, delay: float) -> float:
-    """The gain at which a person closes a loop [1/s]: gain x delay stays within its margin.
+    """Return the gain at which a person closes a loop [1/s]: gain x delay stays within its margin.
 
     A loop of gain K on an integrator, with delay tau, is stable below K tau = pi/2.
 
@@ -358,7 +360,7 @@ class PurePursuit:
         return self._along(route, view, ahead, look, speed if speed < slow else slow)
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
-        """Towards the point ahead on an arc, slower where that would be too sharp.
+        """Return the arc towards the point ahead, slower where it would be too sharp.
 
         Args:
             route: The way to go.

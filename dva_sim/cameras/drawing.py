@@ -59,7 +59,7 @@ class Eyes:
         self.rate = run.camera.rate_hz
 
     def contain(self, number: int, time: float) -> None:
-        """An incident, by its place among all, was dealt with at `time` [s]."""
+        """Note that an incident, by its place among all, was dealt with at `time` [s]."""
         if number in self._contained:
             return
         self._contained[number] = time
@@ -67,7 +67,7 @@ class Eyes:
             self._surroundings.contain(self._real.index(number), time)
 
     def jpeg(self, frame: Line) -> bytes:
-        """The picture of a frame."""
+        """Return the picture of a frame."""
         time = frame["captured_ms"] / 1000
         hazards = [
             incident.hazard
@@ -90,7 +90,7 @@ class Eyes:
         return None if mean is None or layer is None else SmokeView(mean, layer)
 
     def _seen(self, what: str, time: float) -> Raster | None:
-        """Smoke or water, if there is any to be seen; worked out once for all robots."""
+        """Return the smoke or water, if there is any to be seen; worked out once for all robots."""
         if ("smoke" if what == "layer" else what) not in self._shown:
             return None
         tick = math.floor(time / AIR_S) * AIR_S
@@ -103,7 +103,7 @@ class Eyes:
 
 
 def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
-    """Somebody who was near."""
+    """Return the figure of somebody who was near."""
     return Figure(kind, x, y, heading, number=index, lying=activity == DOWN)
 
 
@@ -119,7 +119,7 @@ class Encoder:
         self.quality = BEST
 
     def encode(self, image: Image.Image) -> bytes:
-        """A picture at the quality that suits; after a change of scene it is tried again."""
+        """Return a picture at the quality that suits; after a change of scene it is tried again."""
         data = self._at(image, self.quality)
         while len(data) > self._most and self.quality > WORST:
             self.quality = max(WORST, self.quality - 10)

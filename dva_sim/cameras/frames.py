@@ -36,7 +36,7 @@ class Picture(NamedTuple):
 
 
 def pack(picture: Picture) -> bytes:
-    """A picture as a record."""
+    """Return a picture as a record."""
     robot, number, captured, arrived, jpeg = picture
     header = {"robot": robot, "n": number, "captured_ms": captured, "arrived_ms": arrived}
     data = json.dumps(header | {"bytes": len(jpeg)}, separators=(",", ":")).encode()
@@ -69,7 +69,10 @@ class Unpacker:
         return pictures
 
     def _first(self) -> tuple[Picture | None, int] | None:
-        """The first record and its bytes; no picture if bytes are to be skipped; None to wait."""
+        """Return the first record and its bytes.
+
+        No picture if bytes are to be skipped; None to wait.
+        """
         size = int.from_bytes(self._rest[:4], "big")
         if size > MOST_HEADER or self._rest[4 : 4 + len(MAGIC)] != MAGIC:
             return None, self._skip()

@@ -68,10 +68,10 @@ class Show(Protocol):
 
 
 def contained_line(number: int, when: float) -> ContainedLine:
-    """A hazard is contained at a time [s]."""
+    """Contain a hazard at a time [s]."""
     return {"k": "contain", "t": round(1000 * when), "n": number}
 
 
 def scene_line(scenario: dict[str, Any], seed: int) -> DrawnSceneLine:
-    """Everything that can appear in a picture, as the scenario's plain data."""
+    """Return everything that can appear in a picture, as the scenario's plain data."""
     return {"k": "scene", "t": 0, "scenario": scenario, "seed": seed}

@@ -85,12 +85,12 @@ class Screens:
         return sorted(self._watched)
 
     def hold(self, robots: set[str]) -> None:
-        """Robots whose frames a seat receives anyway."""
+        """Hold robots whose frames a seat receives anyway."""
         self._held = robots
         self._subscribe()
 
     def arrived(self, robot: str, came: CameraFrame | bytes) -> None:
-        """A frame has come over the link."""
+        """Take a frame that has come over the link."""
         taken = self._taken.get(robot)
         frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
         if robot not in self._watched or taken is None or frame is None:
@@ -128,7 +128,7 @@ class Screens:
             del self._taken[robot]
 
     def _film(self, robot: str, frame: CameraFrame) -> None:
-        """A robot has taken a frame: who was near is noted if anybody will see it."""
+        """Note the frame of a robot, and who was near if anybody will see it."""
         self._count[robot] = number = self._count.get(robot, 0) + 1
         if robot not in self._watched:
             return
@@ -166,7 +166,7 @@ class OwnScreens(Screens):
     """Cameras as seen at the robots themselves: without a network between."""
 
     def _subscribe(self) -> None:
-        """Nobody has to be asked for the pictures."""
+        """Subscribe to nothing: nobody has to be asked for the pictures."""
 
     def look(self) -> None:
         """Take a picture with each camera that somebody looks at and that works."""
@@ -185,5 +185,5 @@ def camera_url(base: str, label: str) -> str:
 
 
 def topic_of(url: str) -> str | None:
-    """The frames of a console's cameras, whose URL is one for browsers."""
+    """Return the frames of a console's cameras, whose URL is one for browsers."""
     return FRAME if url.startswith("http") else None

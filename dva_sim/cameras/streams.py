@@ -143,7 +143,7 @@ class CameraStreams:
     # --- pictures out --------------------------------------------------------------------
 
     async def stream(self, viewer: Viewer) -> AsyncGenerator[bytes, None]:
-        """Pictures as parts of a response, each newer than the one before."""
+        """Yield pictures as parts of a response, each newer than the one before."""
         try:
             yield f"--{BOUNDARY}\r\n".encode()
             shown: Picture | None = None
@@ -156,7 +156,7 @@ class CameraStreams:
             self.leave(viewer)
 
     async def one(self, viewer: Viewer) -> Picture | None:
-        """The newest picture; None if there is none for too long."""
+        """Return the newest picture; None if there is none for too long."""
         try:
             known = self._newest.get(viewer.robot)
             if known is not None and time.monotonic() - known[1] < FRESH:
@@ -169,7 +169,7 @@ class CameraStreams:
             self.leave(viewer)
 
     async def _after(self, viewer: Viewer, shown: Picture | None) -> Picture | None:
-        """The newest picture once it is another one; None if there will be no more."""
+        """Return the newest picture once it is another one; None if there will be no more."""
         robot = viewer.robot
 
         def is_new() -> bool:
@@ -189,7 +189,7 @@ class CameraStreams:
 
 
 def part(picture: Picture) -> bytes:
-    """A picture as a part of a multipart response, with the boundary behind it.
+    """Return a picture as a part of a multipart response, with the boundary behind it.
 
     A viewer shows a picture when it knows that it is whole: the next boundary says so at once.
     """
@@ -199,7 +199,7 @@ def part(picture: Picture) -> bytes:
 
 
 def headers_of(picture: Picture) -> dict[str, str]:
-    """HTTP headers of a picture: its number and its times in virtual time [ms]."""
+    """Return the HTTP headers of a picture: its number and its times in virtual time [ms]."""
     return {
         "X-Frame-Number": str(picture.number),
         "X-Frame-Time-Ms": str(picture.captured_ms),

@@ -177,7 +177,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
     # --- actions -------------------------------------------------------------------------
 
     def actions_of(self, advice: Sequence[Advice]) -> list[int]:
-        """The actions that give a piece of advice after the other, and end the decision.
+        """Return the actions that give a piece of advice after the other, and end the decision.
 
         Raises:
             ValueError: a piece cannot be said here, such as a task beyond the last one seen.
@@ -212,7 +212,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         return 1 + piece.task * self._units + unit
 
     def _piece(self, action: int) -> Advice | None:
-        """The advice that an action means; None ends the decision."""
+        """Return the advice that an action means; None ends the decision."""
         if action == DONE:
             return None
         if action < self._announcements:
@@ -361,7 +361,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                     seen["bound_for"][place, bound] = 1.0
 
     def _reward(self) -> float:
-        """Minus the minutes that events have waited since this was asked last."""
+        """Return minus the minutes that events have waited since this was asked last."""
         shift = self._running()
         since = self._since
         waited = 0.0

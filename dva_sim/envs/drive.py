@@ -115,7 +115,7 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         return seen, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}
 
     def _seen(self) -> Vector:
-        """The newest picture as an observation; the last one, where the drive is over."""
+        """Return the newest picture as an observation; the last one, where the drive is over."""
         drive = self.drive
         assert drive is not None
         if (frame := drive.frame) is not None:

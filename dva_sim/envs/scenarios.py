@@ -13,7 +13,7 @@ S = TypeVar("S")
 
 
 def scenario_of(name: str, changes: Mapping[str, Any] | None, kind: type[S], model: str) -> S:
-    """A scenario by name or path, with some keys changed.
+    """Return a scenario by name or path, with some keys changed.
 
     Args:
         name: Name or path.

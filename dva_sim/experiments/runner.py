@@ -26,20 +26,20 @@ class StudyListener:
     """Listener to the steps of a study; this one ignores them."""
 
     def opened(self, study: Study) -> None:
-        """Its file has been read."""
+        """Note that its file has been read."""
 
     def planned(self, plan: StudyPlan) -> None:
-        """Its runs are known, and its cells have no mistakes."""
+        """Note that its runs are known, and its cells have no mistakes."""
 
     def ran(self, results: Results) -> None:
-        """Its tables are written."""
+        """Note that its tables are written."""
 
     def recorded(self, problems: list[str]) -> None:
-        """Its recordings are made, but for these."""
+        """Note that its recordings are made, but for these."""
 
     @contextmanager
     def progress(self, step: str, total: int) -> Iterator[Progress]:
-        """A step takes some time: checking, running, recording or reporting.
+        """Show a step that takes some time: checking, running, recording or reporting.
 
         Args:
             step: Name of the step.

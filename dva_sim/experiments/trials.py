@@ -123,7 +123,7 @@ def chosen_of(study: Study, results: Results) -> TunedValues:
 
 
 def _tried(part: RunGrid, rule: Tuning, when: Setting, value: float) -> TriedValue:
-    """One value, judged by `(persons, trials)` of the measure."""
+    """Return one value, judged by `(persons, trials)` of the measure."""
     cell = part.where(part.grid(rule.measure), {**rule.at, **when, rule.key: value})
     found = mean_interval(cell.ravel(), part.person)
     low, high = (found.low, found.high) if found.n_persons > 1 else (found.mean, found.mean)

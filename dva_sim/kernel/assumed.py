@@ -36,7 +36,10 @@ class Assumed:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """The schema of the field; a number must be above zero, or not below if the band has it."""
+        """Return the schema of the field.
+
+        A number must be above zero, or not below if the band has it.
+        """
         schema = handler(source)
         if schema["type"] in ("float", "int"):
             schema = {**schema, "gt" if self.low > 0 else "ge": 0}
@@ -70,7 +73,7 @@ class Assumption:
 
 
 def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> Iterator[Assumption]:
-    """All assumptions in a model and below, in its order; of a trait its median counts.
+    """Yield all assumptions in a model and below, in its order; of a trait its median counts.
 
     In a scenario a median has a key of its own; in a profile (`depth` 1) the trait's key is it.
 

@@ -109,6 +109,6 @@ class Clock:
         self.env.step()
 
     def _set(self, now: int) -> None:
-        """It is that time [us], and nothing before it is due."""
+        """Set the time [us], before which nothing is due."""
         self._now_us = now
         self.now = now / US

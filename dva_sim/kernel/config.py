@@ -70,7 +70,7 @@ class Key:
 
 
 def titled_keys(model: Any) -> dict[str, Key]:
-    """Every dotted key of a model that says how it is called, in the order of the model."""
+    """Return every dotted key of a model that says how it is called, in the order of the model."""
     values: dict[str, Key] = {}
     for path, info in fields_below(model):
         for key in (m for m in info.metadata if isinstance(m, Key)):
@@ -113,7 +113,7 @@ def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
 
 
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
-    """The fields of the model that stands at `path` inside `model`, by name."""
+    """Return the fields of the model that stands at `path` inside `model`, by name."""
     for number, step in enumerate(path, 1):
         if isinstance(step, int):
             continue
@@ -130,7 +130,7 @@ def _keyed(info: Any) -> Any:
 
 
 def model_in(annotation: Any) -> Any:
-    """The first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
+    """Return the first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for inner in getattr(annotation, "__args__", ()):
@@ -141,7 +141,7 @@ def model_in(annotation: Any) -> Any:
 
 
 def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
-    """All dotted keys by their names, and by what else they are called."""
+    """Return all dotted keys by their names, and by what else they are called."""
     known: dict[str, str] = {}
     for key, info in (item for model in models for item in fields_below(model)):
         for name in (key, *_others(info)):
@@ -150,7 +150,7 @@ def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
 
 
 def _elsewhere(path: KeyPath, known: Mapping[str, str]) -> list[str]:
-    """Keys in other places that are called so, or else the one most like it."""
+    """Return keys in other places that are called so, or else the one most like it."""
     last = plain_name(str(path[-1]))
     names = {name: plain_name(name.rpartition(".")[2]) for name in known}
     near = last if last in names.values() else guess(last, names.values())
@@ -213,7 +213,7 @@ _BOUNDS = {
 def first_mistake(
     model: type[BaseModel], data: Mapping[str, Any], found: Sequence[Any]
 ) -> tuple[str, KeyPath]:
-    """The first mistake, and the path of the key that it is about.
+    """Return the first mistake, and the path of the key that it is about.
 
     Args:
         model: Model of the data.
@@ -235,7 +235,7 @@ def first_mistake(
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
-    """The path of a key, without what names one of several kinds that a value may be of."""
+    """Return the path of a key, without what names one of several kinds that a value may be of."""
     loc = problem["loc"]
     if loc and loc[-1] in _PLAIN and problem["type"].endswith("_type"):
         loc = loc[:-1]
@@ -257,7 +257,10 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
 
 
 def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
-    """One mistake in words, from all that was found at its place: one for each kind allowed."""
+    """Return one mistake in words, from all that was found at its place.
+
+    One for each kind allowed.
+    """
     key = _dotted(path)
     first = problems[0]
     if first["type"] == "extra_forbidden":
@@ -291,7 +294,7 @@ def _measure(info: Any, name: str, problem: Any) -> str:
 
 
 def _given(problem: Any, message: str) -> str:
-    """The value there is, unless it is long or has been told already."""
+    """Return the value there is, unless it is long or has been told already."""
     given = problem["input"]
     if given is None:
         return ", not null" if problem["type"] != "value_error" else ""
@@ -347,12 +350,12 @@ def _in_words(problems: Sequence[Any]) -> str:
 
 
 def _or(words: Sequence[str]) -> str:
-    """`a number, text, or true or false`."""
+    """Return `a number, text, or true or false`."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])}, or {words[-1]}"
 
 
 def _choices(problem: Any) -> list[str]:
-    """The words that a value should be one of."""
+    """Return the words that a value should be one of."""
     return _quoted(problem["ctx"]["expected"])
 
 
@@ -361,7 +364,7 @@ def _quoted(text: str) -> list[str]:
 
 
 def _tag(problem: Any) -> str:
-    """The key whose value says of which kind a mapping is."""
+    """Return the key whose value says of which kind a mapping is."""
     return str(problem["ctx"]["discriminator"]).strip("'")
 
 
@@ -401,7 +404,7 @@ class Config(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The schema of the model, with its numbers and truth values strict."""
+        """Return the schema of the model, with its numbers and truth values strict."""
         schema = handler(source)
         _make_strict(schema)
         return schema

@@ -15,7 +15,7 @@ _SHOWN = 80  # characters of a setting
 
 
 def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
-    """`key=value` pairs, as given on the command line, as a mapping.
+    """Return `key=value` pairs, as given on the command line, as a mapping.
 
     Raises:
         ConfigError: a pair without `=`, or a value that is not YAML.
@@ -103,7 +103,7 @@ def blame(
 
 
 def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
-    """A mistake of changes that were given as `--set key=value`, told with these words."""
+    """Return a mistake of changes that were given as `--set key=value`, told with these words."""
     given = {pair.partition("=")[0].strip(): pair for pair in pairs}
     if error.file is not None or not error.keys:
         return error

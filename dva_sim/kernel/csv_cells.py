@@ -10,10 +10,10 @@ ACTS: Final = r"^[=+\-@\t\r]"  # what a cell begins with that does something
 
 
 def harmless(cell: Any) -> Any:
-    """A cell as it is, or, if it is text that would act, with an apostrophe before it."""
+    """Return a cell as it is, or, if it is text that would act, with an apostrophe before it."""
     return f"'{cell}" if isinstance(cell, str) and re.match(ACTS, cell) else cell
 
 
 def harmless_row(cells: Iterable[Any]) -> list[Any]:
-    """All cells of a row."""
+    """Return all cells of a row."""
     return [harmless(cell) for cell in cells]

@@ -9,13 +9,13 @@ from typing import NoReturn
 
 
 def end_at_once() -> None:
-    """From now on Ctrl-C ends the process: nothing has begun that would have to be put in order."""
+    """Let Ctrl-C end the process from now on: nothing has begun that must be put in order."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # nobody ignores it
         signal.signal(signal.SIGINT, _end)
 
 
 def raise_again() -> None:
-    """From now on Ctrl-C raises `KeyboardInterrupt` again."""
+    """Let Ctrl-C raise `KeyboardInterrupt` again from now on."""
     if signal.getsignal(signal.SIGINT) is _end:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

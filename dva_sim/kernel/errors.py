@@ -97,7 +97,10 @@ _LONGEST = 160  # characters of a word
 
 
 def error_line(problem: object) -> str:
-    """A mistake as the command line says it: one line, whatever a name or a file in it holds."""
+    """Return a mistake as the command line says it.
+
+    One line, whatever a name or a file in it holds.
+    """
     words = (
         word if len(word) <= _LONGEST else f"{word[:_LONGEST]}..." for word in str(problem).split()
     )

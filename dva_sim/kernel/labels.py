@@ -20,7 +20,7 @@ _BLANK: Final = frozenset(
 
 
 def visible(text: str) -> str:
-    r"""Text with an escape, such as `\u202e`, for each character that is invisible.
+    r"""Return the text with an escape, such as `\u202e`, for each character that is invisible.
 
     Those change the direction of text, too, and end lines.
     """
@@ -38,14 +38,14 @@ def look_of(label: str) -> str:
 
 
 def with_id(label: str, id_tag: str) -> str:
-    """A label that no other device has, no longer than a message may hold."""
+    """Return a label that no other device has, no longer than a message may hold."""
     beside = f" ({id_tag})"
     shown = visible(label).strip()[: LONGEST - len(beside)]
     return f"{shown}{beside}" if shown else id_tag
 
 
 def distinct(label: str, id_tag: str, others: Iterable[str]) -> str:
-    """A label as it is shown: with the device's id where one of the others looks the same.
+    """Return a label as it is shown: with the device's id where one of the others looks the same.
 
     Args:
         label: Label as given by a device.

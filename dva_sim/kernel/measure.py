@@ -71,10 +71,10 @@ Columns = Mapping[str, tuple[Measure, ...]]
 
 
 def text(name: str, meaning: str) -> Measure:
-    """A column of words, which nobody can ask for as a measure."""
+    """Return a column of words, which nobody can ask for as a measure."""
     return Measure(name, meaning, is_number=False)
 
 
 def names_of(measures: Iterable[Measure]) -> tuple[str, ...]:
-    """The names of those that are numbers."""
+    """Return the names of those that are numbers."""
     return tuple(measure.name for measure in measures if measure.is_number)

@@ -21,7 +21,7 @@ def number(
     most: float = math.inf,
     below: float = math.inf,
 ) -> float:
-    """A finite number within bounds, each of which may be left out.
+    """Return a finite number within bounds, each of which may be left out.
 
     Raises:
         ConfigError: it is not.
@@ -35,7 +35,7 @@ def number(
 
 
 def whole_number(name: str, value: Any, least: int, most: int) -> int:
-    """A whole number within bounds.
+    """Return a whole number within bounds.
 
     Raises:
         ConfigError: it is not.
@@ -46,7 +46,7 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 
 
 def one_of(name: str, value: Any, known: Collection[str]) -> str:
-    """One of some words.
+    """Return one of some words.
 
     Raises:
         ConfigError: it is not.
@@ -57,7 +57,7 @@ def one_of(name: str, value: Any, known: Collection[str]) -> str:
 
 
 def some_of(name: str, value: Any, known: Collection[str]) -> frozenset[str]:
-    """Any number of some words.
+    """Return any number of some words.
 
     Raises:
         ConfigError: not a list, or another word.
@@ -72,7 +72,7 @@ def some_of(name: str, value: Any, known: Collection[str]) -> frozenset[str]:
 
 
 def _range(least: float, above: float, most: float, below: float) -> str:
-    """Bounds in words: `above 0`, `from 0 to 1`, `of at least 0, below 1`."""
+    """Return bounds in words: `above 0`, `from 0 to 1`, `of at least 0, below 1`."""
     if math.isfinite(least) and math.isfinite(most):
         return f"from {least:g} to {most:g}"
     words = {"of at least": least, "above": above, "at most": most, "below": below}

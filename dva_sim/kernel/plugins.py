@@ -58,7 +58,10 @@ class Plugins(Generic[T]):
     finish: Callable[[T], T] | None = None
 
     def known(self) -> list[str]:
-        """Names that a configuration can use: shipped and installed ones; files come on top."""
+        """Return names that a configuration can use.
+
+        Shipped and installed ones; files come on top.
+        """
         shipped = self.shipped.keys() - self.hidden
         return sorted(shipped | {entry.name for entry in self.installed()})
 
@@ -67,7 +70,7 @@ class Plugins(Generic[T]):
         return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
 
     def files(self) -> list[Path]:
-        """Files in `folder`, whose classes can be named without their path."""
+        """Return files in `folder`, whose classes can be named without their path."""
         found = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
         return sorted({path.resolve(): None for path in found})
 
@@ -100,7 +103,7 @@ class Plugins(Generic[T]):
         return made
 
     def find(self, name: str | Callable[..., T], base: Path | None = None) -> Callable[..., T]:
-        """The class that a name means.
+        """Return the class that a name means.
 
         Args:
             name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under
@@ -169,7 +172,7 @@ class Plugins(Generic[T]):
     # --- files -------------------------------------------------------------------------
 
     def _from_file(self, name: str, base: Path | None) -> type[T] | None:
-        """The class that `file.py:Class` means; None if the name is not of that form."""
+        """Return the class that `file.py:Class` means; None if the name is not of that form."""
         file, colon, wanted = name.rpartition(":")
         if not colon and name.endswith(".py"):
             raise ConfigError(f"{self.kind} {name!r} should name a class too, as {name}:Mine")
@@ -199,7 +202,7 @@ class Plugins(Generic[T]):
     # --- packages ----------------------------------------------------------------------
 
     def _installed(self, name: str) -> type[T]:
-        """The class that an installed package offers under a name."""
+        """Return the class that an installed package offers under a name."""
         offers = {entry.name: entry for entry in self.installed()}
         if name not in offers:
             problem = unknown(self.kind, name, self.known())
@@ -235,7 +238,7 @@ class Guard:
     first_failure: str
 
     def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
-        """Two finite numbers, or None."""
+        """Return two finite numbers, or None."""
         try:
             one, other = ask(*given)
             if math.isfinite(one) and math.isfinite(other):
@@ -262,7 +265,7 @@ def word_of(name: object) -> str:
 
 
 def error_text(error: BaseException) -> str:
-    """An error in one line."""
+    """Return an error in one line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}{import_now(error)}" if text else type(error).__name__
 
@@ -287,7 +290,7 @@ def _run(path: Path, kind: str) -> ModuleType:
 
 
 def _line(error: BaseException, path: Path) -> int | None:
-    """The last line of the file that the error came through."""
+    """Return the last line of the file that the error came through."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if frame.filename == str(path)]
     return lines[-1] if lines else None

@@ -15,7 +15,7 @@ class Rate:
         self._samples: deque[tuple[float, int]] = deque([(0.0, 0)], maxlen=int(RATE_OVER) + 1)
 
     def of(self, count: int, now: float) -> float:
-        """Growth per second over the last samples [1/s], asked for once a second."""
+        """Return the growth per second over the last samples [1/s], asked for once a second."""
         self._samples.append((now, count))
         then, before = self._samples[0]
         return (count - before) / (now - then) if now > then else 0.0

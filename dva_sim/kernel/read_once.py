@@ -39,7 +39,9 @@ def read_once(
 
 
 def version_of(file: Path) -> Version:
-    """Path of a file, and numbers that differ after any change; no numbers if it does not exist.
+    """Return the path of a file, and numbers that differ after any change.
+
+    No numbers if it does not exist.
 
     They include the time of the last status change, since tools that copy or unpack files set the
     modification time back.

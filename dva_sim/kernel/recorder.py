@@ -268,7 +268,7 @@ class DriveLog:
     by: DrivenBy = SIMULATED
 
     def followed(self, tick: int, now: float) -> float:
-        """Something is wanted by the frame of that tick: when that was captured [s].
+        """Return when the frame of that tick was captured [s], by which something is wanted.
 
         What is wanted by no frame, but by the truth, is by what is so now.
         """
@@ -353,7 +353,7 @@ class Recorder:
             self.traffic.append(Sent(time, source, destination, size, payload))
 
     def command_issued(self, source: str, message_id: int, issued: Issued) -> None:
-        """A command leaves the phone."""
+        """Record a command that leaves the phone."""
         self._issued[source, message_id] = issued
 
     def command_applied(
@@ -365,7 +365,7 @@ class Recorder:
         now: float,
         until: float,
     ) -> None:
-        """A command takes effect, and stays in force `until` [s] at the latest."""
+        """Record a command that takes effect, and stays in force `until` [s] at the latest."""
         issued = self._issued.pop((source, message_id), None)
         if issued is None:
             return
@@ -393,7 +393,7 @@ class Recorder:
             del self._issued[key]
 
     def violated(self, rule: str, time: float, who: str, what: str) -> None:
-        """A safety rule was broken: counted always, told once per rule and agent."""
+        """Record a broken safety rule: counted always, told once per rule and agent."""
         if not self.violations[rule]:
             self.tell(time, who, f"{rule} broken: {what}", "safety")
         self.violations[rule] += 1

@@ -42,7 +42,10 @@ KINDS: Final = {
 
 
 def roots() -> list[Path]:
-    """Folders that may hold `worlds/`, `agents/`, ...: working folder, source tree, wheel."""
+    """Return folders that may hold `worlds/`, `agents/`, ....
+
+    Working folder, source tree, wheel.
+    """
     return [Path.cwd(), *_installed()]
 
 
@@ -54,7 +57,7 @@ def _installed() -> tuple[Path, ...]:
 
 
 def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
-    """All files of a kind by name; a nearer folder hides a farther one of the same name."""
+    """Return all files of a kind by name; a nearer folder hides a farther one of the same name."""
     names: dict[str, Path] = {}
     for root in roots():
         for path in sorted((root / folder).glob(pattern)):
@@ -75,7 +78,7 @@ def find(
     base: Path | None = None,
     is_asked: bool = False,
 ) -> Path:
-    """The file that `name` means: a path (also relative to `base`), or a name in `folder`.
+    """Return the file that `name` means: a path (also relative to `base`), or a name in `folder`.
 
     Args:
         name: `experiments/drive.yaml`, `drive.yaml` or just `drive`.
@@ -117,7 +120,7 @@ def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
 
 
 def _meant(path: Path, kind: str, known: list[str]) -> str:
-    """A hint at the file or name that was probably meant; empty without one."""
+    """Return a hint at the file or name that was probably meant; empty without one."""
     try:
         beside = sorted(each.name for each in path.parent.iterdir() if each.suffix in _TEXTS)
     except OSError:
@@ -133,7 +136,7 @@ def _meant(path: Path, kind: str, known: list[str]) -> str:
 def refuse_to_replace(
     paths: Iterable[Path], overwrite: bool = False, way: str = "give another name, or --overwrite"
 ) -> None:
-    """See that nothing is lost of what an earlier run or command left.
+    """Refuse to lose anything that an earlier run or command left.
 
     Args:
         paths: Files to be written.

@@ -28,14 +28,14 @@ class Streams:
         self._streams: dict[str, np.random.Generator] = {}
 
     def __getitem__(self, name: str) -> np.random.Generator:
-        """The stream of that name, begun once and then continued."""
+        """Return the stream of that name, begun once and then continued."""
         stream = self._streams.get(name)
         if stream is None:
             stream = self._streams[name] = self.fresh(name)
         return stream
 
     def fresh(self, name: str) -> np.random.Generator:
-        """The stream of that name from its beginning."""
+        """Return the stream of that name from its beginning."""
         key = np.frombuffer(hashlib.sha256(name.encode()).digest()[:16], dtype=np.uint32)
         sequence = np.random.SeedSequence(self.seed, spawn_key=tuple(int(k) for k in key))
         return np.random.Generator(np.random.PCG64(sequence))

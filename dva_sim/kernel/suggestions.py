@@ -15,7 +15,7 @@ _LISTED: Final = 12  # names in one line; more are counted
 
 
 def guess(given: str, known: Iterable[str]) -> str | None:
-    """The name that was meant; None if no guess is good.
+    """Return the name that was meant; None if no guess is good.
 
     A good guess differs by few slips, has the name as half of it or more, or is the only one that
     begins with it.
@@ -45,7 +45,10 @@ def _begins(one: str, other: str) -> bool:
 
 
 def _slips(one: str, other: str) -> int:
-    """Letters left out, put in, changed, or exchanged with the next; many for another number."""
+    """Return letters left out, put in, changed, or exchanged with the next.
+
+    Many for another number.
+    """
     if abs(len(one) - len(other)) > len(one) // _A_SLIP + 1 or _is_numbered(one, other):
         return len(one) + len(other)
     before = list[int]()
@@ -69,7 +72,7 @@ def _is_numbered(one: str, other: str) -> bool:
 
 
 def hint(given: str, known: Iterable[str], there: str = "known") -> str:
-    """`did you mean 'x'?`; if no guess is good what there is, but not too much of it."""
+    """Return `did you mean 'x'?`; if no guess is good what there is, but not too much of it."""
     names = list(known)
     near = guess(given, names)
     return f"did you mean {near!r}?" if near is not None else f"{there}: {listed(names)}"
@@ -85,17 +88,17 @@ def unknown(what: str, given: object, known: Iterable[str], there: str = "known"
 
 
 def listed(names: Iterable[object], most: int = _LISTED) -> str:
-    """Names in a line; of many the first, and how many there are."""
+    """Return names in a line; of many the first, and how many there are."""
     every = [str(name) for name in names]
     more = f", ... ({len(every)} in all)" if len(every) > most else ""
     return (", ".join(every[:most]) or "none") + more
 
 
 def either(names: Iterable[object]) -> str:
-    """`a, b or c`."""
+    """Return `a, b or c`."""
     return listing([str(name) for name in names], "or")
 
 
 def plain_name(name: str) -> str:
-    """A name without what people mix up: capitals, and the signs between words."""
+    """Return a name without what people mix up: capitals, and the signs between words."""
     return re.sub(r"[\s_.-]+", "_", name.casefold())

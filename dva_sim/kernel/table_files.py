@@ -36,7 +36,7 @@ class Cell:
         return self.row[self.place].strip()
 
     def at(self, place: int) -> Cell:
-        """Another cell of the row."""
+        """Return another cell of the row."""
         return Cell(self.table, self.line, self.row, place)
 
     @property
@@ -54,7 +54,7 @@ class Cell:
         return self.text.replace(",", ".")
 
     def number(self, what: str) -> float:
-        """Content as a finite number.
+        """Return the content as a finite number.
 
         Raises:
             ConfigError: it is none; `what` says what it should be.
@@ -69,7 +69,7 @@ class Cell:
         return value
 
     def error(self, problem: str) -> ConfigError:
-        """A mistake at this cell."""
+        """Return a mistake at this cell."""
         column = 1 + sum(len(cell) + 1 for cell in self.row[: self.place])
         return ConfigError(problem, self.table.file, self.line, column)
 
@@ -98,7 +98,7 @@ class CsvTable:
             yield Cell(self, line, row)
 
     def error(self, problem: str, place: int) -> ConfigError:
-        """A mistake at a name of the header."""
+        """Return a mistake at a name of the header."""
         return Cell(self, self.line, self.names, place).error(problem)
 
 

@@ -29,14 +29,14 @@ UNITS = {
 
 
 def ending_of(name: str) -> str:
-    """The longest ending that is a unit: `s` of `link.delay_s`, nothing of `pattern`."""
+    """Return the longest ending that is a unit: `s` of `link.delay_s`, nothing of `pattern`."""
     words = name.rpartition(".")[2].split("_")[1:]
     endings = ("_".join(words[start:]) for start in range(len(words)))
     return next((ending for ending in endings if ending in UNITS), "")
 
 
 def unit_of(name: str) -> str:
-    """The unit a name ends in, as printed: `link.delay_s` gives `s`, `pattern` nothing."""
+    """Return the unit a name ends in, as printed: `link.delay_s` gives `s`, `pattern` nothing."""
     return UNITS.get(ending_of(name), "")
 
 

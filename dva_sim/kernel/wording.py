@@ -10,14 +10,14 @@ from dva_sim.kernel.units import ending_of
 
 
 def without_unit(name: str) -> str:
-    """A key without its unit and with spaces for the signs between its words."""
+    """Return a key without its unit and with spaces for the signs between its words."""
     ending = ending_of(name)
     stem = name.removesuffix(f"_{ending}") if ending else name
     return stem.replace(".", " ").replace("_", " ")
 
 
 def number(value: float) -> str:
-    """Three figures at most, and never more decimals than the size deserves."""
+    """Return three figures at most, and never more decimals than the size deserves."""
     if not math.isfinite(value):
         return "–"
     decimals = 0 if abs(value) >= 100 else 1 if abs(value) >= 1 else 2
@@ -31,22 +31,25 @@ def as_number(text: str) -> float:
 
 
 def capital(text: str) -> str:
-    """A capital letter first, unless that is of a name such as `min_eta`; others as they are."""
+    """Return a capital letter first, unless that is of a name such as `min_eta`.
+
+    Others as they are.
+    """
     return text if "_" in text.partition(" ")[0] else text[:1].upper() + text[1:]
 
 
 def quantity(value: float, unit: str) -> str:
-    """A number with its unit, apart by a space that does not break."""
+    """Return a number with its unit, apart by a space that does not break."""
     return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)
 
 
 def signed(value: float, unit: str) -> str:
-    """A difference with its sign: `+4.5 s`; zero has none."""
+    """Return a difference with its sign: `+4.5 s`; zero has none."""
     return f"{'+' if value > 0 and number(value) != '0' else ''}{quantity(value, unit)}"
 
 
 def percent(share: float) -> str:
-    """A share as a whole percentage; small ones keep a decimal so that they are not zero."""
+    """Return a share as a whole percentage; small ones keep a decimal so that they are not zero."""
     if not math.isfinite(share):
         return "–"
     text = f"{100 * share:.0f}" if share == 0 or 0.01 <= share <= 0.99 else f"{100 * share:.1f}"
@@ -54,13 +57,16 @@ def percent(share: float) -> str:
 
 
 def first_and_rest(text: str) -> tuple[str, str]:
-    """The first sentence, and the rest, which begins with a capital letter; empty without one."""
+    """Return the first sentence, and the rest, which begins with a capital letter.
+
+    Empty without one.
+    """
     first, *rest = re.split(r"(?<=[.]) (?=[A-Z])", text, maxsplit=1)
     return first, "".join(rest)
 
 
 def listing(words: Sequence[str], last: str = "and") -> str:
-    """`a`, `a and b`, `a, b and c`."""
+    """Return `a`, `a and b`, `a, b and c`."""
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} {last} {words[-1]}"

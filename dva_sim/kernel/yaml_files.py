@@ -103,7 +103,7 @@ class Document:
     places: Mapping[KeyPath, tuple[int, int]] = field(default_factory=dict)
 
     def error(self, problem: str, path: KeyPath = ()) -> ConfigError:
-        """The mistake at `path`, or at its nearest ancestor with a known place."""
+        """Return the mistake at `path`, or at its nearest ancestor with a known place."""
         while path and path not in self.places:
             path = path[:-1]
         line, column = self.places.get(path, (None, None))
@@ -111,7 +111,7 @@ class Document:
 
 
 def read_text(path: Path) -> str:
-    """The text of a file in UTF-8.
+    """Return the text of a file in UTF-8.
 
     Raises:
         ConfigError: unreadable, or a byte that such a text cannot have, with its place.
@@ -155,7 +155,7 @@ def load_yaml(path: str | Path) -> Document:
 
 
 def with_named_files(path: Path) -> list[Path]:
-    """A file and, if it is such a document, the files beside it that it names."""
+    """Return a file and, if it is such a document, the files beside it that it names."""
     if path.suffix not in SUFFIXES:
         return [path]
     try:
@@ -173,12 +173,12 @@ def beside(path: Path, name: str) -> Path:
 
 
 def file_in(name: str) -> str:
-    """The file of a name, which may be that of a class in it: `file.py:Class`."""
+    """Return the file of a name, which may be that of a class in it: `file.py:Class`."""
     return name.rpartition(":")[0] if ".py:" in name else name
 
 
 def texts_in(data: object) -> Iterator[str]:
-    """Every text among plain data, keys apart."""
+    """Yield every text among plain data, keys apart."""
     if isinstance(data, str):
         yield data
     elif isinstance(data, Mapping | list):
@@ -188,7 +188,10 @@ def texts_in(data: object) -> Iterator[str]:
 
 @lru_cache(maxsize=64)
 def _read(text: str) -> tuple[Any, Mapping[KeyPath, tuple[int, int]]]:
-    """Plain data and its places; kept, as each cell of a study reads the same scenario."""
+    """Return the plain data and its places.
+
+    Kept, as each cell of a study reads the same scenario.
+    """
     places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     return _plain(_reader().load(text), (), places), places
 
@@ -207,7 +210,7 @@ class _PlainKinds(RoundTripConstructor):
     """
 
     def construct_object(self, node: Any, deep: bool = False) -> Any:
-        """The value of a node."""
+        """Return the value of a node."""
         if str(node.tag) not in _VALUES:
             tag = str(node.tag).replace(_OWN, "!!")[:64]
             problem = f"{tag} makes no value that is known here; write the value without it"
@@ -221,7 +224,7 @@ class _PlainKinds(RoundTripConstructor):
 
 
 def _reader() -> YAML:
-    """Reads YAML with its places."""
+    """Return a reader of YAML with its places."""
     reader = YAML(typ="rt", pure=True)
     reader.Constructor = _PlainKinds
     return reader
@@ -232,7 +235,7 @@ class _TooMuchError(ValueError):
 
 
 def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> Any:
-    """Plain data without ruamel's types; records the place of every key on the way."""
+    """Return the plain data without ruamel's types; records the place of every key on the way."""
     if len(places) > MOST_VALUES:
         raise _TooMuchError(f"has more than {MOST_VALUES} values, aliases counted")
     if isinstance(node, CommentedMap):

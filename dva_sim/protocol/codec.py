@@ -44,7 +44,7 @@ _MODE = f"({'|'.join(choices('Mode'))})"
 
 
 def _real(whole: str, sign: str = "-?") -> str:
-    """A number with these digits before the point, or one below 10 with an exponent."""
+    """Return a number with these digits before the point, or one below 10 with an exponent."""
     small = r"[0-9](?:\.[0-9]{1,17})?e-[0-9]{2,3}"
     return rf"({sign}(?:{whole}\.[0-9]{{1,22}}|{small}))"
 
@@ -160,7 +160,10 @@ _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] 
 
 
 def read_canonical(data: bytes) -> m.Message | None:
-    """The message, if this is one of those known here; else None, which says nothing about it."""
+    """Return the message, if this is one of those known here.
+
+    Else None, which says nothing about it.
+    """
     reader = _READERS.get(data[-_LAST:]) or _READERS.get(data[-len(_REGISTERS) :])
     if reader is None:
         return None
@@ -184,7 +187,7 @@ def read_canonical(data: bytes) -> m.Message | None:
 
 
 def timestamp(seconds_of_day: float, exact: bool = False) -> str:
-    """Time of day as `HH:MM:SS`; midnight wraps.
+    """Return the time of day as `HH:MM:SS`; midnight wraps.
 
     Args:
         seconds_of_day: [s]
@@ -202,7 +205,7 @@ def _clock_face(second: int) -> str:
 
 
 def encode(message: Message) -> bytes:
-    """The message as UTF-8 XML, valid by the schema.
+    """Return the message as UTF-8 XML, valid by the schema.
 
     Raises:
         ProtocolError: a value that the schema cannot hold (nan, an unknown mode, a bad id, ...),
@@ -216,7 +219,7 @@ def encode(message: Message) -> bytes:
 
 @lru_cache(maxsize=64)
 def decode(data: bytes) -> Message:
-    """The message in `data`; whatever the bytes, a message or a `ProtocolError`.
+    """Return the message in `data`; whatever the bytes, a message or a `ProtocolError`.
 
     A publication is read by every subscriber: the same bytes are validated once.
 

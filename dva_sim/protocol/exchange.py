@@ -47,7 +47,7 @@ class Outbox:
         self._start += by
 
     def message(self, destination: str, body: Body, now: float, session: int = 0) -> Message:
-        """A message that is newer than all before it."""
+        """Return a message that is newer than all before it."""
         self._last_id += 1
         held = None if isinstance(body, Heartbeat) else session
         stamp = timestamp(self._start + now, self._exact)
@@ -98,7 +98,7 @@ class ReplyCache:
         self._kept: OrderedDict[str, _Kept] = OrderedDict()
 
     def get(self, key: Key) -> bytes | None:
-        """The reply to the same request, if it was answered before."""
+        """Return the reply to the same request, if it was answered before."""
         return self._replies.get(key)
 
     def put(self, key: Key, source: str, reply: bytes) -> bytes:
@@ -166,7 +166,7 @@ class Nuisances:
             self._counts.popitem(last=False)
 
     def good(self, peer: Hashable, now: float) -> None:
-        """It has sent a message."""
+        """Note that it has sent a message."""
         if peer in self._counts:
             count = self._count(peer, now) / 2
             if count < 1.0:

@@ -71,7 +71,7 @@ class Fact:
 
     @classmethod
     def of_record(cls, record: m.AuditRecord, time: float, waited: float | None) -> Fact:
-        """A fact as a message tells it, which was heard at a time [s]."""
+        """Return a fact as a message tells it, which was heard at a time [s]."""
         return cls(
             time=time,
             author=record.author,

@@ -23,14 +23,17 @@ _CHARACTER: Final = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
 
 
 def schema_file() -> Path:
-    """The schema that came with the program: one in the working folder must not replace it."""
+    """Return the schema that came with the program.
+
+    One in the working folder must not replace it.
+    """
     found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
     return next(path for path in found if path.is_file())
 
 
 @cache
 def tree() -> etree._ElementTree:
-    """The schema, read once."""
+    """Return the schema, read once."""
     return etree.parse(schema_file())
 
 
@@ -53,17 +56,17 @@ def _restrictions() -> dict[str, etree._Element]:
 
 
 def types_of(element: str) -> set[str | None]:
-    """The types of all elements of a name."""
+    """Return the types of all elements of a name."""
     return {e.get("type") for e in tree().iter(f"{_XS}element") if e.get("name") == element}
 
 
 def names() -> frozenset[str]:
-    """All names of elements."""
+    """Return all names of elements."""
     return frozenset(e.get("name", "") for e in tree().iter(f"{_XS}element"))
 
 
 def choices(name: str) -> list[str]:
-    """The words that a type allows."""
+    """Return the words that a type allows."""
     return facets(name)["enumeration"]
 
 
@@ -80,7 +83,7 @@ def length(name: str) -> tuple[int, int]:
 
 
 def bounds(name: str) -> tuple[float, float]:
-    """The least and the greatest of a type's numbers; of whole numbers they are whole."""
+    """Return the least and the greatest of a type's numbers; of whole numbers they are whole."""
     known = facets(name)
     kind = int if facets(name)["base"][0] in WHOLE else float
     low = known.get("minInclusive", ["0"])[0]
@@ -89,12 +92,15 @@ def bounds(name: str) -> tuple[float, float]:
 
 
 def children(element: etree._Element) -> list[etree._Element]:
-    """The elements that an element may hold, in their order; those of a choice one by one."""
+    """Return the elements that an element may hold, in their order.
+
+    Those of a choice one by one.
+    """
     return list(_below(element))
 
 
 def parts(name: str) -> list[etree._Element]:
-    """The elements of a named type or group; see `children`."""
+    """Return the elements of a named type or group; see `children`."""
     return list(_below(_named()[name]))
 
 
@@ -109,7 +115,7 @@ def _below(node: etree._Element) -> Iterator[etree._Element]:
 
 @cache
 def _named() -> dict[str, etree._Element]:
-    """Types that hold elements, and groups."""
+    """Return types that hold elements, and groups."""
     found = tree().getroot().iterchildren(f"{_XS}complexType", f"{_XS}group")
     return {str(node.get("name")): node for node in found}
 

@@ -80,7 +80,7 @@ class _Place:
 
 
 def check_message(data: bytes) -> list[Problem]:
-    """All that is wrong with a message, in the order of the file; empty if it is valid."""
+    """Return all that is wrong with a message, in the order of the file; empty if it is valid."""
     try:
         decode(data)
     except ProtocolError as error:
@@ -149,7 +149,7 @@ def _by_grammar(data: bytes) -> list[Problem]:
 
 
 def _by_schema(data: bytes) -> list[Problem]:
-    """Every element that the schema refuses, each with the first reason."""
+    """Return every element that the schema refuses, each with the first reason."""
     tree = etree.ElementTree(etree.fromstring(data, _plain_parser()))
     schema = _schema()
     schema.validate(tree)
@@ -226,7 +226,10 @@ def _schema() -> etree.XMLSchema:
 
 
 def _plain_parser() -> etree.XMLParser:
-    """A parser without the schema, as harmless as the codec's; a new one has an empty log."""
+    """Return a parser without the schema, as harmless as the codec's.
+
+    A new one has an empty log.
+    """
     return etree.XMLParser(
         encoding="UTF-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -250,14 +253,14 @@ class Problem:
 
 
 def at(data: bytes, offset: int, text: str) -> Problem:
-    """The mistake at a byte of a text in UTF-8, whichever way its lines end."""
+    """Return the mistake at a byte of a text in UTF-8, whichever way its lines end."""
     before = data[:offset].decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
     line_start = before.rfind("\n") + 1
     return Problem(before.count("\n") + 1, len(before) - line_start + 1, text)
 
 
 def not_text(data: bytes) -> Problem | None:
-    """The first byte that text in UTF-8 cannot have, if there is one."""
+    """Return the first byte that text in UTF-8 cannot have, if there is one."""
     zero = data.find(0)
     try:
         data.decode("utf-8")

@@ -34,7 +34,7 @@ _BLANK_LINES = re.compile(rb"> *+[\t\r\n][ \t\r\n]*+<")
 
 
 def read_validated(data: bytes) -> Message:
-    """The message in any form that the specification allows."""
+    """Return the message in any form that the specification allows."""
     _refuse_by_sight(data)
     try:
         # libxml2 never forgets a run of blanks that it saw between elements.
@@ -87,13 +87,13 @@ def _end_of_declaration(data: bytes) -> int:
 
 @cache
 def _names() -> frozenset[bytes]:
-    """All names of elements in the schema."""
+    """Return all names of elements in the schema."""
     return frozenset(name.encode() for name in limits.names())
 
 
 @cache
 def _parser() -> etree.XMLParser:
-    """The one parser, with the schema attached; lxml locks it for each document."""
+    """Return the one parser, with the schema attached; lxml locks it for each document."""
     # An encoding given here wins over what the document says, which has been checked by sight.
     return etree.XMLParser(
         schema=etree.XMLSchema(file=str(limits.schema_file())),

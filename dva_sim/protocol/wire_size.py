@@ -10,5 +10,5 @@ def sent_time(seconds: float) -> float:
 
 
 def xml_size(text: str) -> int:
-    """Room for a text in XML, where a few signs take four bytes more [B]."""
+    """Return the room for a text in XML, where a few signs take four bytes more [B]."""
     return len(text.encode()) + 4 * sum(text.count(sign) for sign in "&<>")

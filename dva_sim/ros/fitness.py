@@ -39,7 +39,7 @@ class Fitness:
         self._disabled = ""
 
     def connected(self) -> None:
-        """The bridge is there; what came over an earlier connection says nothing any more."""
+        """Note that the bridge is there; an earlier connection's news count no more."""
         self._bridge = self._refused = ""
         self._heard = -math.inf
         self._best = math.inf
@@ -52,7 +52,7 @@ class Fitness:
             self._bridge = f"the bridge is lost: {why}"
 
     def moved(self, now: float, stamp: float | None) -> None:
-        """Odometry has come, and was measured at `stamp` by the robot's clock [s]."""
+        """Take odometry, measured at `stamp` by the robot's clock [s]."""
         self._heard = now
         self._refused = ""
         if stamp is not None:
@@ -62,15 +62,15 @@ class Fitness:
             self._behind = offset - self._best
 
     def refused(self, why: str) -> None:
-        """Odometry has come that says nothing of use."""
+        """Note that odometry has come that says nothing of use."""
         self._refused = why
 
     def disabled(self, why: str) -> None:
-        """It has to be enabled, and is not yet; empty: it is."""
+        """Note why it has to be enabled, and is not yet; empty: it is."""
         self._disabled = why
 
     def obeys(self, now: float, stopped_at: float, has_stood: bool) -> None:
-        """It was told to stand at a time [s], and has stood since or not."""
+        """Note whether it has stood since it was told to, at a time [s]."""
         self._does_not_stop = not has_stood and now - stopped_at > self._limits.stands_within_s
 
     def problem(self, now: float) -> str:
@@ -92,5 +92,5 @@ class Fitness:
         return ""
 
     def needs_another_bridge(self, now: float) -> bool:
-        """True if odometry has been late for so long that a new connection may help."""
+        """Return True if odometry has been late for so long that a new connection may help."""
         return not self._bridge and self._behind > 0 and now - self._late_since > BACKLOG

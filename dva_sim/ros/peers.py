@@ -40,10 +40,10 @@ class PeerHost(Protocol):
         """Return the type of a topic that is served; None: there is none."""
 
     def subscribed(self, peer: RosPeer, topic: str) -> None:
-        """A client wants a topic from now on."""
+        """Note that a client wants a topic from now on."""
 
     def changed(self) -> None:
-        """A client wants less than before."""
+        """Note that a client wants less than before."""
 
     def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
         """Return why a command is refused; empty if it is obeyed."""

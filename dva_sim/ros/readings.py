@@ -234,7 +234,7 @@ def _bare(frame: Any) -> str:
 def _moved(
     before: RosMotion | None, x: float, y: float, heading: float, stamp: float | None
 ) -> RosMotion:
-    """A motion by two places; without times, or with the same time twice, speeds stay."""
+    """Return a motion by two places; without times, or with the same time twice, speeds stay."""
     if before is None:
         return RosMotion(x, y, heading, speed=0.0, turn_rate=0.0, stamp=stamp)
     if stamp is None or before.stamp is None or stamp <= before.stamp:

@@ -105,7 +105,7 @@ class RosbridgeServer:
         self._tell(what)
 
     def now(self) -> float:
-        """Current time [s]."""
+        """Return the current time [s]."""
         return self._clock.now
 
     # --- connections ---------------------------------------------------------------------
@@ -224,7 +224,7 @@ class RosbridgeServer:
         return own | ROSAPI
 
     def type_of(self, topic: str) -> str | None:
-        """Message type of a topic; for a robot that may still come, its future type."""
+        """Return the message type of a topic; for a robot that may still come, its future type."""
         name, _, rest = topic.lstrip("/").partition("/")
         return SHARED.get(topic) or (TYPES.get(rest) if name else None)
 

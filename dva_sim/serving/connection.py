@@ -88,7 +88,7 @@ def reset(transport: Any) -> None:
 
 
 def extended(app: Any, more: dict[str, Any]) -> ASGIApp:
-    """An application that finds more in the scope of each request."""
+    """Return an application that finds more in the scope of each request."""
 
     async def with_more(scope: Scope, receive: Receive, send: Send) -> None:
         scope.setdefault("extensions", {}).update(more)
@@ -98,11 +98,11 @@ def extended(app: Any, more: dict[str, Any]) -> ASGIApp:
 
 
 def place_of(scope: Scope) -> PortConnection:
-    """The place of the connection under a request."""
+    """Return the place of the connection under a request."""
     place: PortConnection = scope["extensions"][PLACE]
     return place
 
 
 def wire_of(scope: Scope) -> Any:
-    """The connection under a request: that of the WebSocket, else `HttpProtocol`."""
+    """Return the connection under a request: that of the WebSocket, else `HttpProtocol`."""
     return scope["extensions"][WIRE]

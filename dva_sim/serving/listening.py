@@ -14,7 +14,7 @@ WAITING = 1024  # connections that are not accepted yet
 
 
 def listen(host: str, port: int, option: str = "--port") -> socket.socket:
-    """A listening socket, so that its port is known before anything is served.
+    """Return a listening socket, so that its port is known before anything is served.
 
     Args:
         host: Address of this machine.

@@ -109,7 +109,7 @@ class PortListener:
         connection.close()
 
     def _heard(self, connection: socket.socket, place: PortConnection) -> None:
-        """A connection has said its first word."""
+        """Note the first word of a connection."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(connection)
         if not self._speaking:

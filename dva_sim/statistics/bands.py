@@ -45,7 +45,7 @@ _ROUNDING = 1e-12  # spread below this share of the values is rounding, not vari
 
 
 def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean, standard error and count per level `(b, k)` for rows weighted `(b, n)`."""
+    """Return the mean, standard error and count per level `(b, k)` for rows weighted `(b, n)`."""
     there = np.isfinite(values)
     filled = np.where(there, values, 0.0)
     count = weights @ there
@@ -62,7 +62,7 @@ def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> Floats:
-    """Excess of each resampled mean in standard errors `(resamples, k)`.
+    """Return excess of each resampled mean in standard errors `(resamples, k)`.
 
     A draw that happens to repeat the same few persons has next to no spread of its own; it is
     given at least a quarter of the sample's. Without that a level at which most persons do not
@@ -83,7 +83,7 @@ def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> 
 
 
 def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
-    """Standard errors from a mean down and up to the ends of its interval, each `(k,)`.
+    """Return standard errors from a mean down and up to the ends of its interval, each `(k,)`.
 
     On either side the farthest of three: Student's, that of the deviations whatever their sign,
     and that of the deviations to this side. With fewer than 6 persons it is Student's.
@@ -158,7 +158,7 @@ class Band:
 
 
 def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES) -> Band:
-    """A band that holds all levels at once with the given confidence.
+    """Return a band that holds all levels at once with the given confidence.
 
     It is each level's own interval at a stricter confidence, the same for all levels: the one at
     which all of them hold at once when persons are resampled. That respects how the levels
@@ -197,7 +197,7 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
 
 
 def _reach_of_all(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
-    """Standard errors down and up to the ends of the band `(k,)`; see `reach`."""
+    """Return standard errors down and up to the ends of the band `(k,)`; see `reach`."""
     each = (1 - level) / max(len(count), 1)
     many = count >= FEWEST_TO_RESAMPLE
     down = np.array([students_t(1 - each, int(n)) for n in count])
@@ -209,7 +209,7 @@ def _reach_of_all(ratio: Floats, count: Floats, level: float) -> tuple[Floats, F
 
 
 def _share_of_each(sizes: Floats, level: float) -> float:
-    """The chance to err at each level that leaves all of them to hold at once with `level`.
+    """Return the chance to err at each level that leaves all of them to hold at once with `level`.
 
     Args:
         sizes: Deviations in bootstrap resamples of persons `(resamples, k)`.

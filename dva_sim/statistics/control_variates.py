@@ -24,7 +24,7 @@ _DISTINCT = 1e-9  # share of its own size by which a covariate differs from the 
 
 
 def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
-    """Persons' values whose mean is the adjusted one, level by level.
+    """Return the persons' values whose mean is the adjusted one, level by level.
 
     A level with too few persons stays as it is, and so does one whose covariates do not vary.
 
@@ -47,7 +47,9 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
 
 
 def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
-    """Jackknife the constant of a regression on covariates `(n, p)`; values as given if singular.
+    """Return the jackknife the constant of a regression on covariates `(n, p)`.
+
+    Values as given if singular.
 
     Leaving a person out changes the constant by what its residual weighs in it.
     """
@@ -63,7 +65,7 @@ def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
 
 
 def off_zero(covariate: ArrayLike) -> float:
-    """By how many standard errors the mean of a covariate `(n,)` is off its true mean of zero."""
+    """Return how many standard errors the mean of a covariate `(n,)` is off its true zero."""
     seen = np.asarray(covariate, dtype=float)
     seen = seen[np.isfinite(seen)]
     if len(seen) < 2 or not np.ptp(seen) > 0:

@@ -42,7 +42,7 @@ class EffectSize:
 def effect_size(
     a: ArrayLike, b: ArrayLike, person: ArrayLike, resamples: int = RESAMPLES
 ) -> EffectSize:
-    """Standardised sizes of `a - b`, over persons' means.
+    """Return the standardised sizes of `a - b`, over persons' means.
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
@@ -112,7 +112,7 @@ class VarianceReduction:
 
 
 def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
-    """Pearson's correlation of paired runs: the randomness that two treatments share.
+    """Return Pearson's correlation of paired runs: the randomness that two treatments share.
 
     Nan with fewer than two pairs, or where one side does not vary.
     """
@@ -129,7 +129,7 @@ def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
 def variance_reduction(
     a: ArrayLike, b: ArrayLike, person: ArrayLike, resamples: int = RESAMPLES
 ) -> VarianceReduction:
-    """The correlation and the ratio of variances that pairing achieved, with their intervals.
+    """Return the correlation and ratio of variances that pairing achieved, with intervals.
 
     It takes what `effect_size` takes.
 
@@ -148,7 +148,7 @@ def variance_reduction(
 
 
 def _on_fishers_scale(statistic: Statistic) -> Statistic:
-    """A correlation where it has no bounds and is spread evenly."""
+    """Return a correlation where it has no bounds and is spread evenly."""
 
     def unbounded(pairs: Pairs) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -168,7 +168,7 @@ def _correlation(pairs: Pairs) -> Floats:
 
 
 def _shared(pairs: Pairs) -> Floats:
-    """Share of the sum of variances that goes by pairing."""
+    """Return the share of the sum of variances that goes by pairing."""
     return np.asarray(1 - pairs.apart / (pairs.first + pairs.second))
 
 
@@ -244,7 +244,7 @@ Statistic = Callable[[Pairs], Floats]
 def _studentised(
     statistics: Sequence[Statistic], first: Floats, second: Floats, resamples: int
 ) -> list[Interval]:
-    """The bootstrap-t of smooth statistics, with the jackknife for their standard errors.
+    """Return the bootstrap-t of smooth statistics, with the jackknife for their standard errors.
 
     Args:
         statistics: Each on a scale without bounds.
@@ -281,7 +281,7 @@ class _Drawn:
         self.left_out = _pairs(sums[:, :, np.newaxis] - rows[:, np.newaxis, :], shift)
 
     def of(self, statistic: Statistic) -> tuple[Floats, Floats]:
-        """A statistic of each draw and its jackknife standard error, each `(b,)`."""
+        """Return a statistic of each draw and its jackknife standard error, each `(b,)`."""
         left_out = statistic(self.left_out)
         n = self.weights.shape[1]
         weights = np.where(np.isfinite(left_out), self.weights, 0.0)
@@ -306,7 +306,7 @@ def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Int
 
 
 def _pairs(sums: Floats, shift: float) -> Pairs:
-    """From sums over persons `(6, ...)`."""
+    """Return pairs from sums over persons `(6, ...)`."""
     count = sums[0]
     one, two, *squares = sums[1:] / np.maximum(count, 1)
     means = one, two, one - two

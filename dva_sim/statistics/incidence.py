@@ -48,7 +48,7 @@ class Incidence:
     events: int
 
     def at(self, times: ArrayLike, cause: int = 1) -> Floats:
-        """Share that had met a cause (1: the first) by each of some times [s]."""
+        """Return the share that had met a cause (1: the first) by each of some times [s]."""
         place = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
         if not self.events:
             return np.full(place.shape, np.nan)
@@ -56,7 +56,9 @@ class Incidence:
         return found
 
     def restricted_mean(self, limit: float, cause: int = 1) -> float:
-        """Mean of the smaller of `limit` [s] and the time to a cause; without it, `limit`.
+        """Return the mean of the smaller of `limit` [s] and the time to a cause.
+
+        Without it, `limit`.
 
         It is the area above the curve. Where all are watched until the limit it is the plain
         mean of `min(time, limit)`, in which an event that never meets the cause counts `limit`.
@@ -95,7 +97,7 @@ def first_of(causes: Sequence[ArrayLike], watched: ArrayLike) -> tuple[Floats, I
 
 
 def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
-    """Aalen and Johansen's estimate of the cumulative incidence of each cause.
+    """Return the Aalen and Johansen's estimate of the cumulative incidence of each cause.
 
     At each time, of those that nothing has happened to so far, the share that meets a cause.
     What happens at the moment at which others are cut off happens before.
@@ -133,7 +135,7 @@ class IncidenceAtHorizon:
 def cumulative_incidence(
     times: ArrayLike, causes: Sequence[Any], horizon: float, person: ArrayLike
 ) -> IncidenceAtHorizon:
-    """Aalen and Johansen's cumulative incidence at a horizon, with intervals over persons.
+    """Return Aalen and Johansen's cumulative incidence at a horizon, with intervals.
 
     A cause that comes first keeps others from being seen; the share of each is what is asked,
     and one minus Kaplan and Meier's estimate, which takes the others for chance, would be
@@ -181,7 +183,7 @@ def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[flo
 
 
 def _interval(share: Floats, persons: int, runs: int) -> Interval:
-    """From the share `[0]` and what it is without each person `[1:]`."""
+    """Return the interval of the share `[0]` by what it is without each person `[1:]`."""
     if persons < 2:
         estimate = float(share[0]) if persons else math.nan
         return Interval(estimate, math.nan, math.nan, persons)

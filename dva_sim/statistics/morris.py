@@ -50,7 +50,7 @@ class ElementaryEffects:
 
 
 def elementary_effects(walks: Floats, outcome: NDArray[np.float64]) -> list[ElementaryEffects]:
-    """Effects of each factor on an outcome.
+    """Return effects of each factor on an outcome.
 
     Args:
         walks: See `trajectories`.

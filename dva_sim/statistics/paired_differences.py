@@ -23,7 +23,7 @@ _SAME = 1e-12  # sums this close, relative to their size, differ by rounding onl
 
 
 def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) -> Interval:
-    """The mean over persons, each counting the same.
+    """Return the mean over persons, each counting the same.
 
     It is what a band gives for one level alone.
 
@@ -42,7 +42,7 @@ def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
 def paired_difference(
     a: ArrayLike, b: ArrayLike, person: ArrayLike, level: float = LEVEL
 ) -> Interval:
-    """The mean over persons of `a - b`, run by run.
+    """Return the mean over persons of `a - b`, run by run.
 
     Args:
         a: Values under one treatment `(n,)`.
@@ -56,7 +56,7 @@ def paired_difference(
 def one_sided_test(
     a: ArrayLike, b: ArrayLike, person: ArrayLike, bound: float, side: Literal["above", "below"]
 ) -> float:
-    """The p-value of the mean of `a - b` being above, or below, a bound.
+    """Return the p-value of the mean of `a - b` being above, or below, a bound.
 
     By the same resampling as the interval of the difference, so that the two agree: p is
     below 0.025 where the interval of 95 % lies beyond the bound.
@@ -76,7 +76,7 @@ def one_sided_test(
 
 
 def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) -> float:
-    """The p-value of two one-sided tests that the mean of `a - b` lies within a margin.
+    """Return the p-value of two one-sided tests that the mean of `a - b` lies within a margin.
 
     Failing to find a difference is no evidence that there is none: here the burden of proof is
     on sameness. It is below 0.05 where the interval of 90 % lies within the margin.
@@ -143,7 +143,7 @@ def _random_signs(n: int) -> Floats:
 
 
 def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
-    """P-values adjusted for their number by Holm's step-down procedure.
+    """Return p-values adjusted for their number by Holm's step-down procedure.
 
     A test is significant at a level, together with all others of its family, where its
     adjusted value is not above that level.
@@ -170,7 +170,7 @@ def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
 def holm_levels(
     p_values: ArrayLike, family: ArrayLike | None = None, alpha: float = 1 - LEVEL
 ) -> Floats:
-    """Level at which Holm's procedure decides on each test: a fraction of `alpha`.
+    """Return the level at which Holm's procedure decides on each test: a fraction of `alpha`.
 
     A test is significant where its own p-value is not above this level, which is when its value
     by `holm` is not above `alpha`. So an interval of this level agrees with the verdict.

@@ -39,7 +39,7 @@ class Interval:
 
 
 def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Floats]:
-    """Each person's mean over the trials that gave a number.
+    """Return each person's mean over the trials that gave a number.
 
     Args:
         values: One value per run `(n,)`, nan where missing.
@@ -57,7 +57,7 @@ def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Fl
 
 
 def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats, Floats]:
-    """Each person's means of two treatments, over the trials that gave both.
+    """Return each person's means of two treatments, over the trials that gave both.
 
     Returns:
         Means of `a` `(m,)` and of `b` `(m,)`, person by person.
@@ -70,7 +70,7 @@ def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats,
 
 
 def students_t(level: float, n: int) -> float:
-    """Student's two-sided quantile for `n` persons; nan with fewer than two."""
+    """Return Student's two-sided quantile for `n` persons; nan with fewer than two."""
     from scipy import special
 
     return float(special.stdtrit(n - 1, (1 + level) / 2)) if n > 1 else math.nan

@@ -32,7 +32,7 @@ def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
 
 
 def interval_of_share(share: float, variance: float, persons: int, runs: int) -> Interval:
-    """Clopper and Pearson's interval on as many independent runs as would have this variance.
+    """Return Clopper and Pearson's interval on as many runs as would have this variance.
 
     Args:
         share: The estimate.
@@ -53,7 +53,7 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
 
 
 def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> Interval:
-    """A quantile of all runs, between the values whose own shares are compatible with it.
+    """Return a quantile of all runs, between the values whose own shares are compatible with it.
 
     Few persons may not bound a high quantile: if all of them can lie below it
     by chance, the upper end is infinite. With 24 persons and 5 trials the 95th percentile of runs
@@ -82,7 +82,7 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
 
 
 def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.intp], int]:
-    """Numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
+    """Return numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
     numbers = np.asarray(values, dtype=float)
     who = np.asarray(person)
     there = np.isfinite(numbers)

@@ -165,7 +165,7 @@ def check_trace(path: Path) -> Found:
 
 
 def check_audit_log(path: Path) -> Found:
-    """The first row of an audit log that is wrong, what is odd in it, and its last hash.
+    """Return the first row of an audit log that is wrong, what is odd in it, and its last hash.
 
     A problem's line is the row's number.
     """

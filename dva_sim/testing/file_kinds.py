@@ -67,7 +67,7 @@ def check_config(kind: FileKind, document: Document) -> list[Problem]:
 
 
 def _mistakes(model: type[Config], document: Document) -> Iterator[ConfigError]:
-    """Mistakes of which there may be several; the only one is raised."""
+    """Yield mistakes of which there may be several; the only one is raised."""
     if model in _CHECKS:
         yield from _CHECKS[model](document)
     elif model in _LOADERS:
@@ -101,7 +101,7 @@ def notes(kind: FileKind, document: Document) -> str:
 
 
 def _without_a_place(document: Document) -> Iterator[str]:
-    """Say of a map in how many runs no event finds a place."""
+    """Yield the say of a map in how many runs no event finds a place."""
     scenario = scenarios.load(PROBE)
     model = model_of(scenario)
     problems = list[str]()
@@ -156,7 +156,7 @@ def _problem(path: Path, error: ConfigError) -> Problem:
 
 # --- kinds -----------------------------------------------------------------------------
 def _check_study(document: Document) -> Iterator[ConfigError]:
-    """The study, its scenarios in every cell, and one run of each built as by the runner."""
+    """Yield the study, its scenarios in every cell, and one run of each built as by the runner."""
     study = load_study(document.file)
     versions = [study, *(load_study(document.file, version=name) for name in study.versions)]
     cells = [cell_grid.to_rehearse(version, cell_grid.cells(version)) for version in versions]
@@ -169,7 +169,7 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
 
 
 def _check_registration(document: Document) -> Iterator[ConfigError]:
-    """The registration, and whether the study beside it is still what was registered."""
+    """Yield the registration, and whether the study beside it is still what was registered."""
     found = load_registration(document)
     file = document.file.parent / f"{found.study}.yaml"
     if not file.is_file():
@@ -190,18 +190,18 @@ def _load_map(document: Document) -> None:
 
 
 def _load_robot(document: Document) -> None:
-    """The profile, and its motors made once."""
+    """Load the profile, and make its motors once."""
     spec = read_robot(document).drive_spec()
     spec.drive(spec)
 
 
 def _load_phone(document: Document) -> None:
-    """The profile, and all that it names made once."""
+    """Load the profile, and make all that it names once."""
     try_phone(validate(PhoneProfile, document.data, document.error))
 
 
 def _frame_of(path: Path) -> GeoFrame:
-    """A plane where the plan is, so that it can be judged without its site."""
+    """Return a plane where the plan is, so that it can be judged without its site."""
     try:
         features = json.loads(read_text(path))["features"]
         position: Any = next(f["geometry"]["coordinates"] for f in features if f.get("geometry"))

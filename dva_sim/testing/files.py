@@ -123,7 +123,7 @@ def _by_content(head: bytes) -> str | None:
 
 
 def _read(path: Path, limit: int) -> bytes:
-    """The first bytes of a file; never waits for a pipe, and never reads more than asked."""
+    """Return the first bytes of a file; never waits for a pipe, and never reads more than asked."""
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
@@ -173,7 +173,7 @@ def _check_evidence(kind: str, path: Path) -> FileVerdict:
 
 
 def _check_yaml(path: Path) -> FileVerdict:
-    """A message needs none of what reads configurations: it is imported here."""
+    """Return the class, imported here: messages need nothing that reads configurations."""
     from dva_sim.experiments.study.file_kinds import recognise  # late: start-up
     from dva_sim.testing.file_kinds import KINDS as FILES  # late: start-up
     from dva_sim.testing.file_kinds import check_config, doubts, notes  # late: start-up
@@ -192,7 +192,7 @@ def _check_yaml(path: Path) -> FileVerdict:
 
 
 def _parse(path: Path) -> tuple[Document | None, Problem | None]:
-    """The document, or why there is none."""
+    """Return the document, or why there is none."""
     try:
         return load_yaml(path), None
     except ConfigError as error:
@@ -212,7 +212,7 @@ _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema_text(kind: str) -> str:
-    """The schema of a kind of file.
+    """Return the schema of a kind of file.
 
     Raises:
         ConfigError: no such kind.
@@ -239,7 +239,7 @@ def _describe_keys(model: dict[str, Any]) -> None:
 
 
 def _json_schema(kind: str) -> dict[str, Any]:
-    """From the models that read the files, of which a scenario and an agent have several."""
+    """Return the schema from the models that read the files; some kinds have several."""
     from pydantic import TypeAdapter
 
     from dva_sim.testing.file_kinds import KINDS as FILES  # late: start-up

@@ -119,7 +119,7 @@ class _Trial:
             yield "is not the same from its own settings", repr(again)
 
     def _sizes(self) -> Iterator[Case]:
-        """Radii and severity: numbers that grow from nothing, whenever it begins."""
+        """Yield the radii and severity: numbers that grow from nothing, whenever it begins."""
         hazard = self._hazard()
         later = self._hazard(LATER)
         fresh = self._hazard()
@@ -140,7 +140,7 @@ class _Trial:
     # --- on a site ---------------------------------------------------------------------
 
     def _answers(self, field: HazardField, order: list[int] | None = None) -> list[Conditions]:
-        """The air at all places and ages, asked in an order; told in the usual one."""
+        """Return the air at all places and ages, asked in an order; told in the usual one."""
         asked = [(*place, START + age) for age in AGES for place in AROUND]
         order = order or list(range(len(asked)))
         began = time.perf_counter()
@@ -150,7 +150,7 @@ class _Trial:
         return [answers[number] for number in range(len(asked))]
 
     def _air(self) -> Iterator[Case]:
-        """Numbers that air can have, where it is and nowhere else."""
+        """Yield numbers that air can have, where it is and nowhere else."""
         field = self._field()
         for before in (0.0, START):
             if any(field.at(*place, before) != CLEAR for place in AROUND):
@@ -175,7 +175,7 @@ class _Trial:
             yield "goes otherwise when it begins later", "the air"
 
     def _stops(self) -> Iterator[Case]:
-        """A source that is stopped changes nothing before, and makes nothing worse."""
+        """Yield cases in which a stopped source changes nothing before, and worsens nothing."""
         whole = self._field()
         stopped = self._field()
         stopped.until = START + STOPPED
@@ -203,7 +203,7 @@ class _Trial:
                 yield "hides otherwise than its air says", f"after {age:g} s"
 
     def _pictures(self) -> Iterator[Case]:
-        """A raster for what it shows, of numbers, empty before it begins."""
+        """Yield a raster for what it shows, of numbers, empty before it begins."""
         field = self._field()
         west, south, east, north = self._site.extent
         x = np.arange(west, east, CELL)
@@ -227,7 +227,7 @@ class _Trial:
                     yield "shows something before it begins", what
 
     def _detectors(self) -> Iterator[Case]:
-        """Detectors of kinds that there are, which notice it whenever it begins."""
+        """Yield detectors of kinds that there are, which notice it whenever it begins."""
         hazard = self._hazard()
         later = self._hazard(LATER)
         for kind in dict.fromkeys((*hazard.detectors, *hazard.noticed_by())):
@@ -272,5 +272,5 @@ def _odd(air: Conditions, where: str) -> Iterator[Case]:
 
 
 def _alike(one: object, other: object) -> bool:
-    """True if numbers are equal up to rounding."""
+    """Return True if numbers are equal up to rounding."""
     return bool(np.allclose(np.array(one), np.array(other), rtol=CLOSE, atol=1e-9, equal_nan=True))

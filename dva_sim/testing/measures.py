@@ -82,7 +82,7 @@ class _Trial:
         self.answers = list[float]()
 
     def says_what_it_is(self) -> Iterator[Case]:
-        """Its name, its meaning and its bounds."""
+        """Yield its name, its meaning and its bounds."""
         about = self._used.about
         if not about.meaning.strip():
             yield "does not say what it means", f"about.meaning of {about.name!r} is empty"
@@ -144,7 +144,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _is_as_before(model: Model[Any], recording: Any, before: str) -> bool:
-    """True if all other measures of a recording are unchanged."""
+    """Return True if all other measures of a recording are unchanged."""
     try:
         return repr(model.rows(recording, with_tracks=True)) == before
     except FAILURES:

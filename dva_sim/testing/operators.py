@@ -115,7 +115,7 @@ class _Trial:
         self.parts = self._robots, self._cursors, self._alike, self._blind, self._ways
 
     def new(self, person: Person, reach: Reach) -> Strategy:
-        """The strategy itself.
+        """Return the strategy itself.
 
         Raises:
             ConfigError: it sees nothing.
@@ -130,7 +130,7 @@ class _Trial:
     # --- whatever is seen --------------------------------------------------------------
 
     def _robots(self) -> Iterator[Case]:
-        """Finite and within reach, whatever is seen."""
+        """Yield cases that must be finite and within reach, whatever is seen."""
         for reach in ROBOTS:
             strategy = self.new(self._persons[0], reach)
             now = 0.0
@@ -190,7 +190,7 @@ class _Trial:
                 yield "remembers what another one did, or draws random numbers", f"on {route}"
 
     def _blind(self) -> Iterator[Case]:
-        """Nothing is answered otherwise before the picture shows why."""
+        """Yield cases in which nothing is answered otherwise before the picture shows why."""
         for person in self._persons:
             plain, pushed = (
                 self._drive(person, ROBOTS[0], "a straight way", 1.0, seconds=12.0, push=push)
@@ -202,7 +202,7 @@ class _Trial:
                     break
 
     def _ways(self) -> Iterator[Case]:
-        """Ways to their end, within a wide corridor; and there it stays."""
+        """Yield ways to their end, within a wide corridor; and there it stays."""
         for name, corners in ROUTES.items():
             way = LineString(corners)
             for delay in DELAYS:
@@ -276,7 +276,7 @@ def _way(corners: Sequence[tuple[float, float]]) -> Route:
 
 
 def _is_pair(got: Any) -> bool:
-    """True if the value is a pair of finite numbers."""
+    """Return True if the value is a pair of finite numbers."""
     try:
         one, other = got
         return math.isfinite(one) and math.isfinite(other)

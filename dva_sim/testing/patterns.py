@@ -135,7 +135,7 @@ class TriedDrive:
     # --- the app ---------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """The robot listens, and the app begins to send."""
+        """Let the robot listen, and the app begin to send."""
         self.network.serve(self.robot, self.inbox.request)
         self.listen()
         self._on = True
@@ -143,7 +143,7 @@ class TriedDrive:
         self.clock.every(1.0 / self.rate_hz, self._offer)
 
     def end(self) -> None:
-        """The app sends nothing more."""
+        """Let the app send nothing more."""
         if self._on:
             self.pattern.end()
         self._on = False
@@ -151,7 +151,7 @@ class TriedDrive:
             self._requester.close()
 
     def listen(self, on: bool = True) -> None:
-        """The robot subscribes, or is gone."""
+        """Let the robot subscribe, or be gone."""
         if self._subscription is not None:
             self._subscription.close()
         self._subscription = self.inbox.flow = None
@@ -289,7 +289,7 @@ class _Trial:
         self.parts = (*links, *robots, self._after_the_end)
 
     def _drive(self, delay: float, loss: float = 0.0, **of_drive: Any) -> TriedDrive:
-        """A drive that has just begun, over links of so many seconds and losses."""
+        """Return a drive that has just begun, over links of so many seconds and losses."""
         config = LinkConfig(delay_s=delay, loss=loss)
         links: dict[tuple[str, str], Link] = {}
 
@@ -353,14 +353,14 @@ class _Trial:
             yield "shares memory with other copies, or draws random numbers", "two drives differ"
 
     def _bad_link(self) -> Iterator[Case]:
-        """Losses make commands late, not fewer without being counted."""
+        """Yield cases in which losses make commands late, not fewer uncounted."""
         drive = self._drive(DELAYS[1], LOSS, attempts=10)
         yield from self._run(drive, 2 * LONG)
         if not any(when > 1.5 * LONG for _, when in drive.applied):
             yield "leaves the robot without commands", f"where {100 * LOSS:g} % is lost"
 
     def _slow_robot(self) -> Iterator[Case]:
-        """The robot cannot keep up; an emergency gets through, and at most the age grows."""
+        """Yield cases of a robot that cannot keep up: emergencies get through, ages may grow."""
         drive = self._drive(DELAYS[1], service=SLOW_SERVICE)
         yield from self._run(drive)
         answered = list[float]()
@@ -377,7 +377,7 @@ class _Trial:
             self.doubts.append(f"lets commands grow old at a slow robot: {oldest:.0f} s")
 
     def _gone(self) -> Iterator[Case]:
-        """Nobody is there any more: who asks finds out in time."""
+        """Yield cases in which nobody is there any more: who asks finds out in time."""
         drive = self._drive(DELAYS[1])
         yield from self._run(drive, 5.0)
         self._leave(drive)
@@ -388,7 +388,7 @@ class _Trial:
             yield "does not find out that nobody is there, and says it would", case
 
     def _back_again(self) -> Iterator[Case]:
-        """The robot was away for a moment."""
+        """Yield cases in which the robot was away for a moment."""
         drive = self._drive(DELAYS[1], attempts=10, timeout=1.0)
         yield from self._run(drive, 5.0)
         self._leave(drive)
@@ -404,7 +404,7 @@ class _Trial:
         drive.network.leave(ROBOT)  # type: ignore[attr-defined]
 
     def _refused(self) -> Iterator[Case]:
-        """Whatever the robot answers, the app goes on or says that it is over."""
+        """Yield cases in which the app goes on, or says that it is over, whatever is answered."""
         for code in (m.BAD_SESSION, m.OUT_OF_ORDER, m.BUSY, 999, None):
             drive = self._drive(DELAYS[1], refuses=code)
             yield from self._run(drive, NOTICED)

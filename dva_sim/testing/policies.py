@@ -196,7 +196,7 @@ def _ways(
     team: tuple[Responder, ...],
     rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
-    """Path length [m] and ETA [s], shape `(tasks, responders)`."""
+    """Return the path length [m] and ETA [s], shape `(tasks, responders)`."""
     goals = rng.uniform(0.0, _PLACE, (len(tasks), 1, 2))
     starts = rng.uniform(0.0, _PLACE, (1, len(team), 2))
     distance = np.abs(goals - starts).sum(axis=2)
@@ -308,7 +308,7 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
 def _broken(
     policy: Policy, situation: Situation, answer: _Answer, other: _Answer
 ) -> Iterator[Case]:
-    """The promises that an answer breaks, also in comparison with the other one's."""
+    """Yield the promises that an answer breaks, also in comparison with the other one's."""
     yield from answer.broke
     advice = answer.advice
     if not isinstance(advice, Sequence) or isinstance(advice, str | bytes):
@@ -324,7 +324,7 @@ def _broken(
 
 
 def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:
-    """Advice of a wrong type, or about what is not there."""
+    """Yield the advice of a wrong type, or about what is not there."""
     stations = len(situation.cover.stations) if situation.cover else 0
     wanted = {
         Assignment: {"task": len(situation.tasks), "responder": len(situation.responders)},
@@ -364,7 +364,7 @@ def _twice(advice: Sequence[Any]) -> Iterator[Case]:
 
 
 def _forbidden(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:
-    """Well-formed advice that the rules do not allow."""
+    """Yield the well-formed advice that the rules do not allow."""
     robots = 0
     for piece in advice:
         if isinstance(piece, Relocation):
@@ -403,5 +403,5 @@ def _bad_move(situation: Situation, move: Relocation) -> Iterator[Case]:
 
 
 def _contents(situation: Situation) -> bytes:
-    """All that a situation holds, arrays as they are now."""
+    """Return all that a situation holds, arrays as they are now."""
     return pickle.dumps([getattr(situation, field.name) for field in fields(situation)])

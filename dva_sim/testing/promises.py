@@ -75,7 +75,7 @@ def tried(check: Callable[..., Outcome], *given: Any, **options: Any) -> Outcome
 
 
 def broken_in(cases: Iterable[Case]) -> list[str]:
-    """A line for each promise that is broken, with the first case of it."""
+    """Return a line for each promise that is broken, with the first case of it."""
     found: dict[str, list[str]] = {}
     for promise, case in cases:
         found.setdefault(promise, []).append(case)
@@ -83,7 +83,7 @@ def broken_in(cases: Iterable[Case]) -> list[str]:
 
 
 def is_slow(slowest: float, slow: float, what: str) -> list[str]:
-    """A warning where one takes longer than it should [s]."""
+    """Return a warning where one takes longer than it should [s]."""
     return [f"is slow: {slowest:.2g} s {what}; should be {slow:g} s"] * (slowest > slow)
 
 
@@ -102,13 +102,13 @@ def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case
 
 
 def line(promise: str, cases: Sequence[str]) -> str:
-    """A promise with the first case in which it was broken."""
+    """Return a promise with the first case in which it was broken."""
     more = f"; and {len(cases) - 1} times more" if len(cases) > 1 else ""
     return f"{promise}: {cases[0]}{more}"
 
 
 def error_with_line(error: BaseException) -> str:
-    """An error in one line, with the line of the file that it comes from."""
+    """Return an error in one line, with the line of the file that it comes from."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{text} ({frame.filename.rsplit('/', 1)[-1]}:{frame.lineno})"
@@ -168,7 +168,7 @@ class CheckedKind:
         return {name: " ".join(text.partition("\n\n")[0].split()) for name, text in texts.items()}
 
     def known(self) -> list[str]:
-        """Names that are shipped or installed."""
+        """Return names that are shipped or installed."""
         from dva_sim.kernel.resources import available  # late: start-up
 
         return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
@@ -186,7 +186,7 @@ class CheckedKind:
 
 
 def plural(kind: str) -> str:
-    """Plural of a kind's name."""
+    """Return the plural of a kind's name."""
     return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 

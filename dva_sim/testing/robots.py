@@ -32,7 +32,7 @@ def check_robot(
     *,
     slow: float = SLOW,
 ) -> Outcome:
-    """See that a robot's motors keep what all promise, first by themselves, then in its body.
+    """Check that motors keep what all promise, first by themselves, then in the robot's body.
 
     Users' motors are held within the limits in a run; here they are tried without that, so
     that nothing is hidden.
@@ -73,7 +73,7 @@ class _State:
     way: float = 0.0
 
     def step(self, speed: float, turn_rate: float) -> None:
-        """One tick; forces act after the body has moved, as in the world."""
+        """Advance by one tick; forces act after the body has moved, as in the world."""
         along, turn = self.drive.accelerations(
             speed, turn_rate, self.speed, self.turn_rate, self.dt
         )
@@ -99,14 +99,14 @@ class _Trial:
         self.parts = (*alone, self._obeys, self._walls)
 
     def _new(self) -> Drive:
-        """The motors themselves."""
+        """Return the motors themselves."""
         drive = self.spec.drive(self.spec)
         while isinstance(drive, GuardedDrive):  # more than once, where it was loaded before
             drive = drive.drive
         return drive
 
     def _command(self) -> tuple[float, float]:
-        """Something within the limits; often one of the limits, or nothing."""
+        """Return a command within the limits; often one of the limits, or nothing."""
         spec = self.spec
         rng = self.rng
         speed = rng.choice([0.0, spec.max_speed, rng.uniform(0, spec.max_speed)])
@@ -128,7 +128,7 @@ class _Trial:
                 yield "aims at a turn rate beyond the limit", case
 
     def _answers(self) -> Iterator[Case]:
-        """Finite, whatever is measured; the same from each copy, used or new."""
+        """Yield cases that must be finite, and the same from each copy, used or new."""
         used = self._new()
         spec = self.spec
         rng = self.rng
@@ -145,7 +145,7 @@ class _Trial:
                 yield "remembers: a new copy answers differently", case
 
     def _drives(self) -> Iterator[Case]:
-        """Limits of motion, over long random drives."""
+        """Yield limits of motion, over long random drives."""
         spec = self.spec
         for number in range(DRIVES):
             self.count += 1
@@ -175,7 +175,7 @@ class _Trial:
             yield "turns faster than its limit", case
 
     def _stops(self) -> Iterator[Case]:
-        """From top speed within the distance that its profile states."""
+        """Yield stops from top speed within the distance that its profile states."""
         spec = self.spec
         stated = spec.stopping_distance
         for turn in (0.0, spec.max_turn_rate, -spec.max_turn_rate):
@@ -194,7 +194,7 @@ class _Trial:
                     yield "stops too late", f"{state.way:.3f} m; its profile says {stated:.3f} m"
 
     def _obeys(self) -> Iterator[Case]:
-        """In its body, whatever it is asked for."""
+        """Yield cases in its body, whatever it is asked for."""
         spec = self.spec
         world = World(hall(60.0, 60.0), LONGEST_TICK)
         robot = world.add_robot("robot", spec, Pose(30.0, 30.0, 0.3))
@@ -209,7 +209,7 @@ class _Trial:
                     yield "leaves its limits when asked for", f"{speed!r}, {turn_rate!r}"
 
     def _walls(self) -> Iterator[Case]:
-        """At top speed against a thin wall, at every angle, and against where it ends."""
+        """Yield drives at top speed against a thin wall, at every angle, and against its end."""
         spec = self.spec
         run = 2.0 + spec.max_speed**2 / spec.max_acceleration + spec.radius
         size = 2 * run + 4

@@ -76,7 +76,7 @@ def check_mapping(
 def _concluded(
     parts: Sequence[Part], doubts: Callable[[], Iterator[str]], took: list[float], slow: float
 ) -> Outcome:
-    """Outcome of all parts, up to the first that is broken."""
+    """Return the outcome of all parts, up to the first that is broken."""
     broken = broken_in(part_by_part(parts))
     slowest = min(took, default=0.0)
     warnings = [] if broken else list(doubts())
@@ -99,7 +99,7 @@ class _FilterTrial:
         )  # fmt: skip
 
     def _values(self, filter_: Filter, samples: Sequence[Pair]) -> list[Pair]:
-        """The value at each moment at which one is taken."""
+        """Return the value at each moment at which one is taken."""
         every = filter_.batch or 1
         values = []
         for number, sample in enumerate(samples, 1):
@@ -119,7 +119,7 @@ class _FilterTrial:
             yield "is not zero before the first sample", _pair_text(value)
 
     def _bounds(self) -> Iterator[Case]:
-        """Finite, and never beyond what came in; zero is what a filter begins with."""
+        """Yield cases that must be finite, and never beyond what came in, or zero."""
         hostile = [(one, other) for one in HOSTILE for other in HOSTILE]
         for number in range(RUNS):
             samples = self._samples() if number else hostile
@@ -175,7 +175,7 @@ class _FilterTrial:
                 )
 
     def _ages(self) -> Iterator[Case]:
-        """A rising input, from long before on, comes out as much later as the filter says."""
+        """Yield a rising input, from long before on, comes out as much later as the filter says."""
         filter_ = self.make()
         count = LONG - LONG % (filter_.batch or 1)  # so that the last sample ends a batch
         value = self._values(filter_, [(n / 100, -n / 100) for n in range(count)])[-1]
@@ -188,7 +188,7 @@ class _FilterTrial:
                 yield "is not as old as it says", case
 
     def sticks(self) -> Iterator[str]:
-        """A doubt: batches that end early, as when the longest delay of the app is short."""
+        """Yield a doubt: batches that end early, as when the longest delay of the app is short."""
         batch = self.make().batch
         if batch is None:
             return
@@ -284,7 +284,7 @@ class _MappingTrial:
                 )
 
     def _rest(self) -> Iterator[Case]:
-        """A phone held at rest stands, and turns no faster than when it came to rest."""
+        """Yield cases of a phone at rest: it stands, or turns no faster than before."""
         for level, turn in ((8.0, 25.0), (3.0, -12.0), (0.0, 0.0)):
             mapping = self.make()
             for _ in range(50):
@@ -300,7 +300,10 @@ class _MappingTrial:
                 yield "drives at rest", f"level {speed:g} after {_pair_text((level, turn))}"
 
     def _way(self) -> Iterator[Case]:
-        """Tilting to the left turns to the left, and more tilt no less; and so with speed."""
+        """Yield the tilting to the left turns to the left, and more tilt no less.
+
+        And so with speed.
+        """
         before: Pair = 0.0, 0.0
         for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0):
             reading = share * HAND[0], share * HAND[1]
@@ -324,7 +327,7 @@ class _MappingTrial:
                     yield "would tilt to what is no number", f"for {_pair_text(wanted)}"
 
     def _steered(self) -> Iterator[Case]:
-        """A hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
+        """Yield a hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
         for wanted in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
             mapping = self.make()
             shown = (0.0, 0.0)

@@ -77,7 +77,7 @@ class _Trial:
         self.parts = (self._carry, self._carry, self._stay_away, self._be_alone)
 
     def _carry(self) -> Iterator[Case]:
-        """Commands and pictures; the second time on the ports of the first."""
+        """Yield commands and pictures; the second time on the ports of the first."""
         with _Robot(self._make, self._port) as robot:
             seen: list[bytes] = []
             try:
@@ -121,7 +121,7 @@ class _Trial:
             yield promise, f"{others[0][:40]!r} was not sent"
 
     def _stay_away(self) -> Iterator[Case]:
-        """The robot's end takes nothing for a while."""
+        """Yield cases in which the robot's end takes nothing for a while."""
         with _Robot(self._make, self._port) as robot:
             near = self._make().near(robot.place, lambda _: None)
             robot.pause()
@@ -214,7 +214,7 @@ def _served(near: TransportEnd) -> Iterable[Case]:
 
 
 def _free_ports() -> int:
-    """The first of three free ports in a row, as far as a look can tell."""
+    """Return the first of three free ports in a row, as far as a look can tell."""
     while True:
         with _bound(0) as port:
             try:

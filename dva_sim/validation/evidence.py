@@ -81,7 +81,7 @@ class Evidence:
 
 
 def short_number(value: float | None) -> str:
-    """Four digits that count, without an exponent; a dash where there is none."""
+    """Return the four digits that count, without an exponent; a dash where there is none."""
     if value is None or value != value:
         return "–"
     if abs(value) == float("inf"):
@@ -90,7 +90,7 @@ def short_number(value: float | None) -> str:
 
 
 def _range(low: float | None, high: float | None) -> str:
-    """A band in words, which may have one end or none."""
+    """Return a band in words, which may have one end or none."""
     if low is None or high is None:
         end = short_number(high if low is None else low)
         return end if low is high else f"at {'most' if low is None else 'least'} {end}"
@@ -99,17 +99,17 @@ def _range(low: float | None, high: float | None) -> str:
 
 
 def of_rule(lines: Iterable[Evidence]) -> list[Evidence]:
-    """The lines that decide whether a subject passes."""
+    """Return the lines that decide whether a subject passes."""
     return [line for line in lines if line.group == RULE]
 
 
 def judged(lines: Iterable[Evidence]) -> list[Evidence]:
-    """The claims that have a verdict."""
+    """Return the claims that have a verdict."""
     return [line for line in lines if line.group != RULE and line.verdict != "shown only"]
 
 
 def passes(lines: Iterable[Evidence]) -> bool:
-    """True if a rule is applied, and holds in each of its lines."""
+    """Return True if a rule is applied, and holds in each of its lines."""
     rule = of_rule(lines)
     return bool(rule) and all(line.verdict != "misses" for line in rule)
 
@@ -141,7 +141,10 @@ def share_rule(
 
 
 def headline(lines: Sequence[Evidence]) -> str:
-    """Present state of a subject: how many lines hold, which do not, and whether its rule holds."""
+    """Return the present state of a subject.
+
+    How many lines hold, which do not, and whether its rule holds.
+    """
     misses = names_of_misses(lines)
     missed = ""
     if sum(line.verdict == "misses" for line in judged(lines)) > MOST_NAMED:
@@ -152,7 +155,7 @@ def headline(lines: Sequence[Evidence]) -> str:
 
 
 def count_of(lines: Iterable[Evidence]) -> str:
-    """Number of lines that hold, and of all that have a verdict."""
+    """Return the number of lines that hold, and of all that have a verdict."""
     verdicts = [line.verdict for line in judged(lines)]
     rough = verdicts.count("too rough")
     more = f", {rough} are too rough to say" if rough else ""
@@ -160,7 +163,7 @@ def count_of(lines: Iterable[Evidence]) -> str:
 
 
 def names_of_misses(lines: Iterable[Evidence]) -> list[str]:
-    """Names of all lines that miss, measures of one condition together."""
+    """Return names of all lines that miss, measures of one condition together."""
     names: dict[str, list[str]] = {}
     for line in judged(lines):
         if line.verdict == "misses":
@@ -185,7 +188,7 @@ def _shortfall(line: Evidence) -> str:
 
 
 def read_evidence(path: Path) -> list[Evidence]:
-    """The lines of a table that was written.
+    """Return the lines of a table that was written.
 
     Raises:
         ConfigError: it cannot be read, or is another table.

@@ -140,7 +140,7 @@ class ValidationResult:
 
 
 def sheets_of(lines: Sequence[Evidence], most: int | None = None) -> list[ResultSheet]:
-    """A sheet for each group of the lines of a subject, the rule last.
+    """Return a sheet for each group of the lines of a subject, the rule last.
 
     Args:
         most: Number of lines above which a group has only those that were judged and do not hold.
@@ -153,7 +153,7 @@ def sheets_of(lines: Sequence[Evidence], most: int | None = None) -> list[Result
 
 
 def _sheet(title: str, lines: Sequence[Evidence], most: int | None) -> ResultSheet:
-    """The lines of a group; a row of one cell is the source of those below it."""
+    """Return the lines of a group; a row of one cell is the source of those below it."""
     shown = lines
     text = ""
     if most is not None and len(lines) > most:
@@ -168,14 +168,14 @@ def _sheet(title: str, lines: Sequence[Evidence], most: int | None) -> ResultShe
 
 
 def not_judged(lines: Sequence[Evidence]) -> list[ResultSheet]:
-    """Reasons why lines have no verdict, with their number."""
+    """Return reasons why lines have no verdict, with their number."""
     reasons = Counter(e.note for e in lines if e.verdict == "shown only" and e.group != RULE)
     rows = [(why, str(count)) for why, count in reasons.items()]
     return [ResultSheet("Not judged", ("why", "lines"), rows)] if rows else []
 
 
 def page(result: ValidationResult, lines: Sequence[Evidence], drawn: Sequence[Drawn]) -> str:
-    """Everything on one page, with figures inside and the look of all reports.
+    """Return everything on one page, with figures inside and the look of all reports.
 
     Args:
         lines: Evidence of this result, and of other subjects.
@@ -232,7 +232,7 @@ def _write_parquet(path: Path, rows: Sequence[Row]) -> None:
 
 
 def _kind(rows: Sequence[Row], name: str) -> str:
-    """The type of a column, by its first value that is there."""
+    """Return the type of a column, by its first value that is there."""
     values = (row[name] for row in rows if row[name] is not None)
     return _KINDS[type(next(values, 0.0))]
 

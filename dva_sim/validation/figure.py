@@ -56,7 +56,7 @@ def draw(lines: Sequence[Evidence]) -> Drawn:
 
 
 def captioned(figure: Figure, name: str) -> Drawn:
-    """A figure with its title and caption, which are in `templates/captions.yaml`."""
+    """Return a figure with its title and caption, which are in `templates/captions.yaml`."""
     words = load_yaml(Path(__file__).parent / "templates/captions.yaml").data[name]
     return finish(figure, name, words["title"], words["text"])
 
@@ -87,7 +87,7 @@ def _draw_panel(axes: Axes, lines: Sequence[Evidence]) -> None:
 
 
 def ratios(line: Evidence) -> _Mark | None:
-    """The line as ratios; None if it has no place on a logarithmic axis."""
+    """Return the line as ratios; None if it has no place on a logarithmic axis."""
     low = line.low
     high = line.high
     at = line.measured

@@ -21,7 +21,7 @@ Progress = Callable[[int], None]
 def job_of(
     name: str, seed: int, scenario: object, *, person: int = 0, **asked: str | int
 ) -> StudyJob:
-    """A job of a validation.
+    """Return a job of a validation.
 
     Args:
         name: Name of the job, unique together with its seed.
@@ -50,7 +50,7 @@ def play_jobs(
     progress: Progress = lambda done: None,
     count: Callable[[list[Row]], int] = lambda rows: 1,
 ) -> dict[Key, list[Row]]:
-    """The rows of each job by its key.
+    """Return the rows of each job by its key.
 
     Args:
         program: Plays one; all its rows are in a table `rows`.

@@ -101,7 +101,7 @@ class ControlRoomAgent:
         self.device.ask(self.device.dva, body, answered, failed)
 
     def _ask_above(self, number: int | None) -> None:
-        """The list comes in parts, by number."""
+        """Take one part of a list that comes in parts, by number."""
 
         def more(reply: m.Reply) -> None:
             if not isinstance(reply.content, m.EventList):

@@ -71,7 +71,7 @@ class ScriptedDispatcher:
 
     @staticmethod
     def _wants_something(status: m.EventStatus, turned: Turned) -> bool:
-        """It is new; or the policy asks what has not been decided yet."""
+        """Return True for a new event, or one about which the policy asks what is undecided yet."""
         if status.closed_for is not None or turned.tries >= MOST_TRIES:
             return False
         return not turned.looks or status.proposed is not None

@@ -43,7 +43,7 @@ class EventHistory:
         self._known: m.EventStatus | None = None
 
     def hear_status(self, status: m.EventStatus, at: float) -> None:
-        """The DVA has stated the event at a time [s]."""
+        """Take the DVA's statement of an event at a time [s]."""
         before = self._known
         self._known = status
         if before is None:
@@ -59,7 +59,7 @@ class EventHistory:
             self._add(EventStep(at - status.state_for, status.event_state, "", there or ""))
 
     def hear_record(self, record: m.AuditRecord, at: float) -> None:
-        """The DVA tells of a decision at a time [s]."""
+        """Take the DVA's record of a decision at a time [s]."""
         if record.code != m.OK or record.action == "acknowledge":
             return  # nothing was done, or the status says so
         words = ": ".join(word for word in (self._said(record), record.reason) if word)

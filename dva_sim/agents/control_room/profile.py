@@ -62,7 +62,7 @@ class DispatcherProfile(Config):
     @model_validator(mode="before")
     @classmethod
     def _spreads_stay(cls, data: Any) -> Any:
-        """A median that is given alone leaves the usual spread around it."""
+        """Return the usual spread around a median that is given alone."""
         if not isinstance(data, dict):
             return data
         usual = {name: cls.model_fields[name].default for name in ("acknowledge_s", "decide_s")}

@@ -49,7 +49,7 @@ class Screen(Protocol):
     log: DriveLog
 
     def look_away(self) -> None:
-        """The person looks at another screen."""
+        """Turn to another screen."""
 
 
 def next_screen(
@@ -106,7 +106,7 @@ class Attention:
         self._choosing = False
 
     def begin(self, screen: Screen) -> None:
-        """There is another screen; the only one is looked at at once."""
+        """Add a screen; the only one is looked at at once."""
         self._screens.append(screen)
         self._seen.append(-math.inf)
         if self._current is None:
@@ -116,7 +116,7 @@ class Attention:
             self._clock.every(self._habits.reconsiders_s, self._reconsider)
 
     def end(self, screen: Screen) -> None:
-        """A screen goes off; another is looked at, if there is one."""
+        """Remove a screen that goes off, and look at another, if there is one."""
         if screen not in self._screens:
             return
         if screen is self._current:
@@ -243,20 +243,20 @@ class DriverSeat:
         self._times = Counter[int]()
 
     def judged_delay(self, now: float) -> float:
-        """The delay as the person judges it at a moment [s]."""
+        """Return the delay as the person judges it at a moment [s]."""
         return self._timing.judged(self.delay.value, self.person.usual_delay, now)
 
     def reading(self) -> float:
-        """From an order on the screen to acting on it, this time [s]."""
+        """Return the time from an order on the screen to acting on it, this time [s]."""
         return self.person.reading * math.exp(OCCASIONS * next(self._readings))
 
     def noise(self, event: int) -> Iterator[float]:
-        """Standard normal numbers for one more time at an event, whatever the pattern."""
+        """Return standard normal numbers for one more time at an event, whatever the pattern."""
         self._times[event] += 1
         return _normals(self._looks(f"{event}/{self._times[event]}"), block=64)
 
     def judge(self, seen: Observation) -> Observation:
-        """A frame as the person takes it: place and heading with an error."""
+        """Return a frame as the person takes it: place and heading with an error."""
         person = self.person
         error = self._errors
         return make_observation(
@@ -272,5 +272,5 @@ class DriverSeat:
 
 
 def _normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
-    """Standard normal numbers without end, drawn in blocks."""
+    """Return standard normal numbers without end, drawn in blocks."""
     return chain.from_iterable(rng.normal(size=block).tolist() for _ in repeat(None))

@@ -134,7 +134,7 @@ class CommandSender:
             self._let(self._pattern.offer, made)
 
     def _go_on(self) -> None:
-        """A reply has come, or none will: an app that waited for it looks again."""
+        """Go on after a reply, or without one: an app that waited for it looks again."""
         if not (self._is_held and self._on) or self._is_asking:
             return
         self._is_held = False
@@ -162,7 +162,7 @@ class CommandSender:
         return None if command is None else _make_made(command, now, tick)
 
     def _message(self, made: Made) -> Message:
-        """A command that is sent now; its tick is of when it was made."""
+        """Return a command that is sent now; its tick is of when it was made."""
         now = self.clock.now
         command = made.command
         body = make_set_tele_op(command.speed, command.turn_rate, made.seen_tick)
@@ -176,13 +176,13 @@ class CommandSender:
     # --- being told no -------------------------------------------------------------------
 
     def _answered(self, command: Message, data: bytes) -> None:
-        """A reply has come: what it says is heard whatever the pattern makes of it."""
+        """Take a reply: what it says is heard whatever the pattern makes of it."""
         reply = self._device.reply_to(command, data)
         code = None if reply is None else reply.code
         self._heed(self.refusals.answered(code, self.clock.now))
 
     def _on_holder(self, data: bytes) -> None:
-        """The robot says who holds it, for those whom nobody answers."""
+        """Hear from the robot who holds it, for those whom nobody answers."""
         message = self._device.read(data, self.drive.robot) if self._on else None
         if message is not None and isinstance(body := message.body, RobotHolder):
             now = self.clock.now
@@ -276,7 +276,7 @@ class CommandSender:
         self.drive.superseded += 1
 
     def code_of(self, reply: bytes) -> int | None:
-        """Code in a reply; None if it cannot be read."""
+        """Return the code in a reply; None if it cannot be read."""
         message = self._device.read(reply, self.drive.robot)
         return message.body.code if message and isinstance(message.body, Reply) else None
 

@@ -66,12 +66,12 @@ class DelayEstimate:
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
-        """The person asks for this from `now` [s] on: speed and turn rate, or two velocities."""
+        """Note what the person asks for from `now` [s] on: speed and turn rate, or velocities."""
         self._remember(now)
         self._intent = one, other
 
     def see(self, now: float, one: float, other: float, over: float = 0.0) -> None:
-        """The picture shows this motion at `now` [s].
+        """Compare the motion in the picture at `now` [s] with what was asked for.
 
         A motion that was summed over a time is compared with what was asked for over as long.
 
@@ -107,7 +107,7 @@ class DelayEstimate:
         self.value = float(self._lags[misfit.argmin()]) + self._hand
 
     def rest(self) -> None:
-        """Nothing is looked at for a while; that time stands for nothing seen."""
+        """Pause: the time in which nothing is looked at does not count as nothing seen."""
         self._last = None
 
     def _past(self, steps: int) -> Floats:
@@ -177,14 +177,16 @@ class PeriodEstimate:
         self.value = self.likely = 0.0
 
     def intend(self, now: float, one: float, other: float) -> None:
-        """The person asks for this from `now` [s] on, as shares of the limits."""
+        """Note what the person asks for from `now` [s] on, as shares of the limits."""
         for channel, asked in zip(self._channels, (one, other), strict=True):
             lost = channel.ask(now, self._delay, asks=abs(asked) >= self._habits.noticed)
             if lost > 0.0:
                 self._weigh(1.0 - np.minimum(lost / self._periods, 1.0))
 
     def see(self, now: float, one: float, other: float, delay: float) -> float:
-        """The picture shows this motion, as shares of the limits: the period as it is taken now.
+        """Compare the motion in the picture, as shares of the limits, with what was asked for.
+
+        The period as it is taken now.
 
         Args:
             now: [s]
@@ -263,7 +265,9 @@ class _Channel:
         self._asks = self.moves = False
 
     def ask(self, now: float, delay: float, *, asks: bool) -> float:
-        """Motion is asked for from `now` [s] on, or rest: the length of a move that was lost [s].
+        """Ask for motion from `now` [s] on, or for rest.
+
+        The length of a move that was lost [s].
 
         Args:
             now: [s]

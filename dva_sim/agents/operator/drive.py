@@ -41,7 +41,7 @@ HEADINGS = 16  # design: looked at for a place with room
 
 
 def roomiest(here: Point, planner: Planner, step: float) -> Point:
-    """The place a step [m] away that is farthest from walls, and is reached straight [m]."""
+    """Return the place a step [m] away that is farthest from walls, and is reached straight [m]."""
     angles = np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS)
     ring = np.array(here) + step * np.stack([np.cos(angles), np.sin(angles)], 1)
     half = 0.5 * (ring + np.array(here))
@@ -73,7 +73,9 @@ class CloseQuarters:
         return self._from is not None
 
     def notice(self, now: float, seen: Observation, asked: float, delay: float) -> bool:
-        """A frame is perceived: True if from now on the person drives carefully, on a new way.
+        """Perceive a frame.
+
+        True if from now on the person drives carefully, on a new way.
 
         Args:
             now: [s]
@@ -98,7 +100,10 @@ class CloseQuarters:
         return True
 
     def way(self, here: Point, goal: Point, planner: Planner) -> Floats | None:
-        """The new way `(n, 2)` [m]; who is held back again first goes to where there is room."""
+        """Return the new way `(n, 2)` [m].
+
+        Who is held back again first goes to where there is room.
+        """
         via = roomiest(here, planner, self._habits.step_out_m) if self._again else here
         points = planner.path(via, goal)
         return points if points is None or not self._again else np.vstack([here, points])
@@ -170,7 +175,7 @@ class Teleoperation(Work):
         self._nearer_at = 0.0
 
     def begin(self) -> None:
-        """The robot has agreed to be driven: look, and tilt."""
+        """Begin to look and to tilt: the robot has agreed to be driven."""
         seat = self._seat
         now = self._clock.now
         super().begin()
@@ -196,7 +201,7 @@ class Teleoperation(Work):
         return m.StopTeleOp()
 
     def _see(self, observation: Observation) -> None:
-        """A frame is on the screen; the person perceives it a little later."""
+        """Take a frame on the screen; the person perceives it a little later."""
         self._seen_tick = observation.tick
         if self._sender is not None and isinstance(self._strategy, Strategy):
             delay = self._seat.person.perceptual_delay
@@ -211,7 +216,7 @@ class Teleoperation(Work):
         self._count_failures()
 
     def _make_sender(self) -> CommandSender:
-        """The pattern decides how commands travel, and nothing else."""
+        """Return how commands travel, which the pattern decides, and nothing else."""
         setup = self._seat.setup
         return CommandSender(
             self._device,
@@ -232,7 +237,7 @@ class Teleoperation(Work):
     # --- seeing ------------------------------------------------------------------------
 
     def _perceive(self, observation: Observation) -> None:
-        """A frame has reached the person's mind."""
+        """Act on a frame that has reached the person's mind."""
         seat = self._seat
         now = self._clock.now
         if self.over or not isinstance(self._strategy, Strategy):
@@ -284,7 +289,7 @@ class Teleoperation(Work):
         return careful.drive(self._route, seen, delay, keep)
 
     def _look_at_truth(self) -> bool:
-        """The oracle's own loop; False ends it."""
+        """Return the oracle's own loop; False ends it."""
         seat = self._seat
         if self.over or seat.setup.truth is None or not isinstance(self._strategy, Oracle):
             return False
@@ -300,7 +305,7 @@ class Teleoperation(Work):
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:
-        """Is the event in view, is the place empty? The strategy's way, if still needed."""
+        """Return the strategy's way, if still needed: is the event in view, is the place empty?"""
         found = self._looking.look(self._clock.now, seen)
         if found is not None:
             self.end(*found)

@@ -57,7 +57,7 @@ class Gathered:
         self.failed: Callable[[], object] = lambda: None
 
     def __call__(self, done: bool, text: str, /, **_: object) -> None:
-        """One of them has come."""
+        """Take one sample."""
         self._left -= 1
         (self._good if done else self._bad).append(text)
         if self._left == 0:

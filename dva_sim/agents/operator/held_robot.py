@@ -143,7 +143,7 @@ class HeldRobot:
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     def give_back(self) -> None:
-        """The person needs the robot no longer: it is stopped first."""
+        """Stop the robot and give it back."""
         if self.phase == "gone":
             return
         self.stop("gave up" if self.is_driven else "")
@@ -152,7 +152,7 @@ class HeldRobot:
         self._be_gone()
 
     def revoked(self, session: int) -> None:
-        """The DVA says that a session is over; the robot has been told, too."""
+        """End a session that is over by the DVA's word; the robot has been told, too."""
         if self.phase != "gone" and session == self.session:
             self.end("gave up")
             known = "" if self._has_answered else f"; {self._silence()}"
@@ -160,7 +160,7 @@ class HeldRobot:
             self._be_gone()
 
     def taken_back(self, outcome: str) -> None:
-        """The DVA has ended the session; the robot has been told, or soon will be."""
+        """End the session that the DVA has ended; the robot has been told, or soon will be."""
         if self.phase != "gone":
             self.stop(outcome)
             self._be_gone()
@@ -209,14 +209,14 @@ class HeldRobot:
             self._alert(f"{self.label}: {self._silence()}")
 
     def _on_status(self, data: bytes) -> None:
-        """The robot is there; with its tick one may drive it in sight, without a picture."""
+        """Take a status: with its tick one may drive a robot in sight, without a picture."""
         message = self.device.read(data, self.robot) if self.phase != "gone" else None
         if message is not None and isinstance(message.body, m.RobotStatus):
             self._heard = self.device.clock.now
             self._tick = message.body.tick
 
     def drew(self, captured_ms: int | None) -> None:
-        """The person's page says which picture of the robot it has drawn last.
+        """Note which picture of the robot the person's page has drawn last.
 
         A page that stops drawing goes on saying so: what it commands is then as old as that
         picture, whatever has arrived here since.
@@ -248,7 +248,7 @@ class HeldRobot:
         return None if newest == -math.inf else int(newest)
 
     def _unreachable(self) -> None:
-        """The robot has not answered after all attempts; it may be asked again."""
+        """Give up on a robot that has answered no attempt; it may be asked again."""
         if self.phase != "gone":
             self._alert(f"{self.label}: {self._silence()} after {self.device.attempts} attempts")
 
@@ -368,14 +368,14 @@ class HeldRobot:
                 self._sender.look_now()
 
     def tilted(self, number: int, at: float) -> None:
-        """So many samples of the person's phone have come, the newest taken at a time [s]."""
+        """Take samples of the person's phone, the newest taken at a time [s]."""
         reach = self._console().reach(self.robot)
         level, turn = self.app.shown
         speed = level * SPEED_PER_LEVEL / reach.speed
         self.steered(Input(number, at, speed, math.radians(turn) / reach.turn_rate))
 
     def steered(self, given: Input) -> None:
-        """An input has come: it is remembered until it acts."""
+        """Take an input, and remember it until it acts."""
         self.last = given
         if self.phase == "driving":
             self._inputs.append(given)
@@ -413,7 +413,7 @@ class HeldRobot:
         steps.ask_emergency(self.device, self.robot, self.session, on_result)
 
     def _listen(self, log: DriveLog) -> bool:
-        """No picture and no status for too long: the link is lost, whatever the pattern."""
+        """Lose the link after too long without picture or status; return True in a drive."""
         goes_on = self.log is log and self.phase == "driving"
         silent = self.device.clock.now - max(self.arrived, self._heard, log.started or 0.0)
         if goes_on and silent > self._lost_after:
@@ -431,7 +431,7 @@ class HeldRobot:
         self._alert(f"{self.label}: {why}")
 
     def end(self, outcome: str) -> None:
-        """A drive is over, however it ended, or its start."""
+        """End a drive, or its start, whatever the cause."""
         on_started = self._starting
         self._starting = None
         if on_started is not None:

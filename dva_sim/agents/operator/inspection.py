@@ -29,7 +29,7 @@ STILL = 1.0 / 3.0  # source: Nuthmann 2017: a still picture is worth one fixatio
 
 
 def clearness(angle: float, half_seen: float) -> float:
-    """Clearness of something in a picture, from 0 to 1, by the angle that it fills [rad].
+    """Return clearness of something in a picture, from 0 to 1, by the angle that it fills [rad].
 
     Args:
         angle: [rad]
@@ -147,7 +147,7 @@ class Looking:
         return self._blind > self._habits.nearer_after_s
 
     def look(self, now: float, seen: Observation) -> Conclusion | None:
-        """A picture is perceived at `now` [s]: the outcome and why, once there is one."""
+        """Perceive a picture at `now` [s]; return the outcome and why, once there is one."""
         gap = math.inf if self._last is None else now - self._last
         self._last = now
         event = self._event_in(seen)
@@ -161,7 +161,7 @@ class Looking:
         return ("confirmed", "") if self._evidence.sure else found
 
     def look_away(self) -> None:
-        """The person looks at something else: what is not seen counts for nothing."""
+        """Turn to something else: what is not seen counts for nothing."""
         self._last = None
         self.at_place = False
 
@@ -172,7 +172,7 @@ class Looking:
         return near and self._planner.line_of_sight(here, self._place)
 
     def _event_in(self, seen: Observation) -> SeenHazard | None:
-        """The event, if it is in the picture."""
+        """Return the event, if it is in the picture."""
         if not seen.hazards:
             return None
         place = self._place
@@ -181,7 +181,7 @@ class Looking:
         return next((h for h in near if h.kind == self._kind), None)
 
     def _search(self, gap: float, seen: Observation, nothing: bool) -> Conclusion | None:
-        """At the place: look around for a while, if anything can be seen, then say so.
+        """Look around at the place for a while, if anything can be seen, then say so.
 
         Args:
             gap: Looking time since the last picture [s].
@@ -204,7 +204,7 @@ class Looking:
         return None
 
     def _contrast_at_place(self, seen: Observation) -> float:
-        """Share of its contrast that the smoke before the place leaves."""
+        """Return the share of its contrast that the smoke before the place leaves."""
         if seen.visibility >= CLEAR:
             return 1.0
         distance = math.dist((seen.x, seen.y), self._place)

@@ -87,7 +87,7 @@ class OperatorAgent:
         return m.Reply(message.message_id, m.OK, "")
 
     def _on_revocation(self, body: m.PermissionRevocation) -> None:
-        """The robot is no longer ours to drive; it has been told, too.
+        """Let go of a robot that is no longer ours to drive; it has been told, too.
 
         Before the drive, that session may be over since the robot knows a higher one: ask again.
         """
@@ -149,7 +149,7 @@ class OperatorAgent:
                 work.end(outcome)
 
     def _on_recall(self, event_id: int) -> None:
-        """The DVA says that an order is over."""
+        """End an order that is over by the DVA's word."""
         for order in self._orders:
             if order.event_id == event_id:
                 self._drop(order, RECALLED)
@@ -236,7 +236,7 @@ class OperatorAgent:
         )
 
     def _finish(self, drive: Work, outcome: str, why: str) -> None:
-        """A drive is over: stop the robot, tell the DVA, be free again."""
+        """Finish a drive: stop the robot, tell the DVA, be free again."""
         device = self.device
         order = drive.order
         device.tell(f"{AS_SEEN.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
@@ -287,7 +287,7 @@ class OperatorAgent:
             device.ask(drive.robot, drive.ending(), give_back, give_back, drive.session)
 
     def _give_back(self, robot: str, session: int) -> None:
-        """A permission is needed no longer, unless what is next is of the same robot."""
+        """Give back a permission, unless the next order is for the same robot."""
         if session and not self._wants(robot):
             steps.give_back(self.device, robot, session)
 

@@ -84,7 +84,7 @@ class PersonAgent:
     # --- what the person does ------------------------------------------------------------
 
     def sit_down(self) -> None:
-        """Somebody takes the seat."""
+        """Let a person take the seat."""
         self.attended = True
         self.alert = ""
 
@@ -156,7 +156,7 @@ class PersonAgent:
                 held.emergency(answers)
 
     def ended_by_others(self, robots: Sequence[str]) -> None:
-        """Somebody else at this console sends these robots an emergency."""
+        """Note an emergency that somebody else at this console sends these robots."""
         for robot in robots:
             held = self.robots.get(robot)
             if held is not None and held.is_driven:
@@ -262,7 +262,7 @@ class PersonAgent:
         self._end_order(f"event {self.order.event_id} is {state}", "gave up")
 
     def _end_order(self, why: str, outcome: str) -> None:
-        """With an order the DVA ends the right to drive its robot."""
+        """End an order, and with it the right to drive its robot."""
         assert self.order is not None
         held = self.robots.get(self.order.device or "")
         self.order = None
@@ -272,7 +272,7 @@ class PersonAgent:
         self._alert(why)
 
     def _on_frame(self, held: HeldRobot, frame: CameraFrame) -> None:
-        """The app says by itself when the robot is where it was sent."""
+        """Note the arrival where the robot was sent, as the app does."""
         order = self.order
         seen = frame.observation
         if order is None or self._arrived or not (held.event and held.phase == "driving"):

@@ -183,7 +183,7 @@ class SplitFile(Config):
     memory: dict[str, tuple[str, ...]]
 
     def kinds(self) -> dict[str, LineKind]:
-        """The kind of each check.
+        """Return the kind of each check.
 
         Raises:
             ConfigError: a check that is assigned twice.
@@ -191,7 +191,7 @@ class SplitFile(Config):
         return {check: kind for check, (kind, _) in self.places().items()}
 
     def places(self) -> dict[str, tuple[LineKind, str]]:
-        """The kind of each check, and the publication that it belongs to.
+        """Return the kind of each check, and the publication that it belongs to.
 
         Raises:
             ConfigError: a check that is assigned twice.
@@ -269,7 +269,7 @@ class TargetLine:
 
 
 def load_targets(name: str = TARGETS) -> TargetFile:
-    """The targets, by name or path.
+    """Return the targets, by name or path.
 
     Raises:
         ConfigError: no such file, or a mistake in it, with its place.
@@ -279,7 +279,7 @@ def load_targets(name: str = TARGETS) -> TargetFile:
 
 
 def load_split(name: str = SPLIT) -> SplitFile:
-    """The split, by name or path.
+    """Return the split, by name or path.
 
     Raises:
         ConfigError: no such file, or a mistake in it, with its place.
@@ -294,7 +294,7 @@ def load_split(name: str = SPLIT) -> SplitFile:
 
 
 def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
-    """All lines with their kind, in the order of the file of targets.
+    """Return all lines with their kind, in the order of the file of targets.
 
     Raises:
         ConfigError: a check that is not assigned, or is not there; a tag M that would count.
@@ -346,7 +346,7 @@ def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
 
 
 def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, float], ...]:
-    """Delays of the loop at which people were watched, each from and to [s].
+    """Return delays of the loop at which people were watched, each from and to [s].
 
     Args:
         strategy: Strategy of the operators.

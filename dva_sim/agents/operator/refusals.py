@@ -44,7 +44,7 @@ class Refusals:
     _doubtful: int = 0
 
     def answered(self, code: int | None, now: float) -> str:
-        """A command was answered: why nobody obeys any more, or nothing.
+        """Take the answer to a command; return why nobody obeys any more, or nothing.
 
         Args:
             code: Code of the reply; None if it cannot be read, or belongs to something else.
@@ -62,7 +62,7 @@ class Refusals:
         return self._over(code)
 
     def held(self, holder: str | None, code: int | None, now: float, sent: int) -> str:
-        """The robot says who holds it: why nobody obeys any more, or nothing.
+        """Hear from the robot who holds it; return why nobody obeys any more, or nothing.
 
         A report from before the drive may arrive late. So reports count once the robot has
         confirmed this driver, or when the same report is repeated.
@@ -95,7 +95,7 @@ class Refusals:
         return self._over(code) if ours else self._over(m.NOT_PERMITTED, TAKEN if holder else "")
 
     def _too_late(self, code: int, now: float, limit: float) -> str:
-        """One more that came late, and none that did not since the first of them."""
+        """Return one more that came late, and none that did not since the first of them."""
         if self._late == 0:
             self._late_since = now
         self._late += 1

@@ -118,7 +118,7 @@ class ScriptedOperator:
 
 
 def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
-    """A whole session: find a robot, drive it, stop it by emergency, be refused, drive again.
+    """Return a whole session: find a robot, drive, emergency stop, refusal, drive again.
 
     Args:
         operator: Operator that follows the script.
@@ -149,7 +149,10 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
 def _drive(
     operator: ScriptedOperator, robot: str, session: int, commands: int
 ) -> Generator[Ask | Pause, m.Reply | None, bool]:
-    """Start, and send so many commands; False if the robot cannot be started, or obeys no more."""
+    """Start, and send so many commands.
+
+    False if the robot cannot be started, or obeys no more.
+    """
     name = operator.device.label_of(robot)
     if not (yield from _start(robot, session)):
         operator.tell(f"cannot start {name}")
@@ -207,5 +210,5 @@ def _start(robot: str, session: int) -> Generator[Ask | Pause, m.Reply | None, b
 
 
 def _swaying(number: int, seen_tick: int | None) -> m.SetTeleOp:
-    """Slowly forward, to the left and to the right by turns."""
+    """Return a command slowly forward, to the left and to the right by turns."""
     return m.SetTeleOp(0.1, 0.3 * math.sin(number / 10.0), seen_tick)

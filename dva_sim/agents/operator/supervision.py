@@ -89,17 +89,17 @@ class Work:
         raise NotImplementedError
 
     def begin(self) -> None:
-        """The robot has agreed: from now on there is something to look at."""
+        """Begin to look: the robot has agreed."""
         self.log.started = self._last_frame = self._clock.now
         self._clock.every(1.0, self._watch_picture)
         self._seat.attention.begin(self)
 
     def look_away(self) -> None:
-        """The person looks at another screen."""
+        """Turn to another screen."""
         self._looking.look_away()
 
     def on_frame(self, shown: CameraFrame | bytes) -> None:
-        """A frame is on the screen."""
+        """Take a frame on the screen."""
         frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
         if frame is None:
             self._device.recorder.counters["refused: no picture"] += 1
@@ -110,7 +110,7 @@ class Work:
         self._see(frame.observation)
 
     def link_lost(self, why: str = "no answer and no picture") -> None:
-        """Three sends without an answer, or no picture: the app alerts."""
+        """Take the app's alert: three sends without an answer, or no picture."""
         self.end("lost link", why)
 
     def end(self, outcome: str, why: str = "") -> None:
@@ -131,13 +131,13 @@ class Work:
         raise NotImplementedError
 
     def _put_down(self) -> None:
-        """Whatever is in the hand."""
+        """Put down whatever is in the hand."""
 
     def _arrive(self) -> None:
         self._device.progress(self.order.event_id, "arrived")
 
     def _watch_picture(self) -> bool:
-        """No picture for too long: the link is lost, whatever the pattern."""
+        """Lose the link after too long without a picture; return True while there is work."""
         patience = self._seat.person.habits.looking.wait_for_picture_s
         passed = self._clock.now - self._last_frame
         if not self.over and passed > max(patience, self._device.timeout):
@@ -165,12 +165,12 @@ class Supervision(Work):
         return m.CancelMission()
 
     def begin(self) -> None:
-        """The robot is on its way: watch the picture, and ask now and then how it stands."""
+        """Watch the picture of a robot on its way, and ask now and then how it stands."""
         super().begin()
         self._ask_later()
 
     def _see(self, observation: Observation) -> None:
-        """A frame is on the screen; who looks at that perceives it a little later."""
+        """Take a frame on the screen; who looks at it perceives it a little later."""
         if self._seat.attention.looks_at(self):
             delay = self._seat.person.perceptual_delay
             self._clock.call_after(delay, self._perceive, observation)

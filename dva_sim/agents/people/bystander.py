@@ -60,7 +60,7 @@ Point = tuple[float, float]
 
 
 def nothing_seen(x: float, y: float, time: float) -> bool:
-    """The eyes of who has no hazard to see."""
+    """Return the eyes of who has no hazard to see."""
     return False
 
 
@@ -147,7 +147,7 @@ class BystanderAgent(OnFoot):
     # --- alarm -------------------------------------------------------------------------
 
     def alarm(self, now: float) -> None:
-        """The alarm sounds; who has left, or is about to, does not mind."""
+        """Sound the alarm; who has left, or is about to, does not mind."""
         self._leave_at(now + self._occupant.premovement)
 
     def _leave_at(self, time: float) -> None:
@@ -161,7 +161,7 @@ class BystanderAgent(OnFoot):
         self._clock.call_at(time, self._evacuate)
 
     def _felt(self) -> None:
-        """Half a second more in this air."""
+        """Breathe this air for half a second more."""
         now = self._clock.now
         if self.dose.incapacitated:
             self._collapse()
@@ -212,7 +212,7 @@ TRIES: Final = 100  # design: to find a place
 def draw_places(
     site: Site, rng: np.random.Generator, count: int, taken: Sequence[Point] = ()
 ) -> list[Point]:
-    """Places of one person [m]: rooms by their area, anywhere in them.
+    """Return places of one person [m]: rooms by their area, anywhere in them.
 
     Args:
         site: Site of the places; on a bare map, which has no rooms, anywhere.
@@ -240,7 +240,7 @@ def _draw(site: Site, rng: np.random.Generator, rooms: list[str], areas: list[fl
 
 @lru_cache(maxsize=16)
 def _workrooms(site: Site) -> tuple[list[str], list[float]]:
-    """Rooms where people work, and the share of each in their area."""
+    """Return rooms where people work, and the share of each in their area."""
     rooms = [room for room in site.rooms if not room.outdoor and not _is_passage(room)]
     rooms = [room for room in rooms if _has_place(site, room.name)]
     areas = np.array([_sides(room)[0] * _sides(room)[1] for room in rooms])
@@ -253,7 +253,7 @@ def _is_passage(room: Room) -> bool:
 
 
 def _sides(room: Room) -> tuple[float, float]:
-    """The shorter and the longer side of the smallest rectangle around a room [m]."""
+    """Return the shorter and the longer side of the smallest rectangle around a room [m]."""
     import shapely
 
     corners = shapely.get_coordinates(shapely.oriented_envelope(room.area))

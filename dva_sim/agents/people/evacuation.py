@@ -99,7 +99,7 @@ def choose_escape(
     limits: Sequence[StrainLimit],
     habits: LeavingHabits = USUAL,
 ) -> Escape | None:
-    """The nearest refuge by the way there, on a way without bad places.
+    """Return the nearest refuge by the way there, on a way without bad places.
 
     A longer way around bad places is taken if every refuge's shortest way leads through some.
     If there is none either, less has to do: a way that keeps the limits but the first. If no
@@ -145,7 +145,7 @@ def _keeping(
 def _nearest_first(
     planner: Planner, here: Point, refuges: Sequence[Point], avoid: Sequence[Disc]
 ) -> Iterator[tuple[Point, Floats]]:
-    """Refuges that can be reached and the ways there, the shortest first.
+    """Yield refuges that can be reached and the ways there, the shortest first.
 
     No way is shorter than the straight line: none is planned before a known one that is.
     """
@@ -191,7 +191,7 @@ AirAt = Callable[[float, float, float], Conditions]
 
 
 def clean_air(x: float, y: float, time: float) -> Conditions:
-    """Air without hazards."""
+    """Return air without hazards."""
     return CLEAR
 
 
@@ -227,11 +227,11 @@ class Exposure:
             self._clock.every(PERIOD, lambda: self._look(then))
 
     def end(self) -> None:
-        """The person is out of it."""
+        """Let the person out of it."""
         self._over = True
 
     def step_out(self) -> None:
-        """The person stands just beyond an exit, in clean air, until it walks again."""
+        """Place the person just beyond an exit, in clean air, until it walks again."""
         self._is_outdoors = True
 
     def _look(self, then: Callable[[], object]) -> bool:

@@ -206,7 +206,7 @@ class GuardAgent(OnFoot):
                 clock.call_after(self._walker.look, self._looked, errand)
 
     def _give_up(self, errand: Errand) -> None:
-        """Nobody needs who has stood by for so long."""
+        """Give up standing by, after nobody has needed this guard for so long."""
         if errand is self._protocol.errand:
             self._finish("failed")
 
@@ -251,7 +251,7 @@ class GuardAgent(OnFoot):
     # --- what is too much --------------------------------------------------------------
 
     def _felt(self) -> None:
-        """Half a second more in this air."""
+        """Breathe this air for half a second more."""
         if self.dose.incapacitated:
             self.exposure.end()
             self._give_back("lies down")
@@ -302,7 +302,7 @@ class GuardAgent(OnFoot):
         return [*post, *(place for place in self._refuges if place != self._post)]
 
     def _is_safe(self) -> None:
-        """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
+        """Recover at a refuge, unless hurt; at an exit step out."""
         here = self.walking.place
         near = self._habits.is_there_m
         if any(math.dist(here, place) < near for place in self._refuges):

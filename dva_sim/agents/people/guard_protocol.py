@@ -102,7 +102,7 @@ class GuardProtocol:
                 return GuardDecision(m.NOT_SUPPORTED, "a guard takes orders to walk")
 
     def is_over(self, at_event: bool = False) -> None:
-        """The errand is done with; the guard waits where it is, which may be at the event."""
+        """End the errand; the guard waits where it is, which may be at the event."""
         self._at_event = self.order.event_id if at_event and self.order else None
         self.errand = None
 

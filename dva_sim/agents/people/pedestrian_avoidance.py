@@ -61,7 +61,7 @@ def velocity(
     room: Callable[[Floats], Floats],
     habits: WalkingHabits = USUAL,
 ) -> Point:
-    """The velocity to want now [m/s].
+    """Return the velocity to want now [m/s].
 
     Args:
         me: Person who walks.
@@ -111,7 +111,7 @@ def is_clear(
 
 
 def _up_to_bodies(me: Mover, velocities: Floats, others: Sequence[Mover], berth: float) -> Floats:
-    """Way before touching the first of `others`, for each of some velocities `(n, 2)` [m].
+    """Return the way before touching the first of `others`, by velocity `(n, 2)` [m].
 
     Discs touch when |p - w t| = r, with the place p and the velocity w of one relative to the
     other: the smaller root of a quadratic.
@@ -131,7 +131,7 @@ def _up_to_bodies(me: Mover, velocities: Floats, others: Sequence[Mover], berth:
 
 
 def _up_to_walls(me: Mover, ways: Floats, room: Callable[[Floats], Floats]) -> Floats:
-    """Way before touching a wall, for each of some directions `(n, 2)` [m]."""
+    """Return the way before touching a wall, for each of some directions `(n, 2)` [m]."""
     points = (me.x, me.y) + ways[:, None, :] * PROBES[None, :, None]
     fits = room(points.reshape(-1, 2)).reshape(len(ways), -1) >= me.radius - FEELS_ROOM
     reached = np.concatenate([[0.0], PROBES[:-1], [HORIZON]])
@@ -156,7 +156,7 @@ def middles_of(doors: Floats, narrow: float) -> Floats:
 
 
 def doors_on(way: Floats, middles: Floats) -> list[Door]:
-    """The doors that a way `(n, 2)` goes through, in its order."""
+    """Return the doors that a way `(n, 2)` goes through, in its order."""
     if not len(middles):
         return []
     gaps = np.hypot(*(way[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
@@ -180,7 +180,7 @@ class Courtesy:
         self._since: float | None = None  # when it began to wait [s]
 
     def waits_for(self, me: Body, gone: float, near: Sequence[Body], now: float) -> Door | None:
-        """The door that this person lets somebody else through first.
+        """Return the door that this person lets somebody else through first.
 
         Args:
             me: Person who walks.
@@ -218,7 +218,7 @@ def _comes_through(
 def beside(
     door: Door, me: Body, room: Callable[[Floats], Floats], habits: WalkingHabits = USUAL
 ) -> Point:
-    """A place to wait beside the way through a door [m]: right of it if one fits, else left.
+    """Return a place to wait beside the way through a door [m]: right of it if one fits, else left.
 
     Args:
         me: Person who waits; it stays where it is if there is no such place.

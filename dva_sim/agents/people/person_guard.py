@@ -117,12 +117,12 @@ class PersonGuard(OnFoot):
     # --- what the person does ----------------------------------------------------------------
 
     def join(self) -> None:
-        """Somebody plays this guard from now on."""
+        """Let a person play this guard from now on."""
         self.attended = True
         self.alert = ""
 
     def leave(self) -> None:
-        """Nobody does any more: an order that is open is given back."""
+        """End the person's play: an open order is given back."""
         if self.order is not None:
             self._give_back("failed" if self.answered else "declined", "leaves")
         self.attended = self._needs_help = False
@@ -246,7 +246,7 @@ class PersonGuard(OnFoot):
         return m.Reply(message.message_id, answer.code, answer.text)
 
     def _changed(self, had: m.Order | None, errand: Errand | None) -> None:
-        """There is another errand, or none any more."""
+        """Take another errand, or none any more."""
         self.answered = False
         self._stage = ""
         self._order_at = self.walking.place
@@ -285,7 +285,7 @@ class PersonGuard(OnFoot):
         self._needs_help = False
 
     def _felt(self) -> None:
-        """Half a second more in this air: it is for the person to leave."""
+        """Breathe this air for half a second more: leaving it is up to the person."""
         if self.exposure.is_too_much and self.attended:
             self.alert = "the air where you stand is dangerous: leave"
 

@@ -33,7 +33,10 @@ class PaceProfile(Config):
     walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
 
     def draw_speed(self, rng: np.random.Generator) -> float:
-        """One person's free walking speed [m/s]: normal, no slower or faster than walking is."""
+        """Return one person's free walking speed [m/s].
+
+        Normal, no slower or faster than walking is.
+        """
         speed = rng.normal(self.walking_mean_mps, self.walking_sd_mps)
         return float(np.clip(speed, SLOWEST, FASTEST))
 
@@ -90,7 +93,7 @@ class Walker:
 
     @classmethod
     def draw(cls, profile: GuardProfile, rng: np.random.Generator) -> Walker:
-        """One guard of a profile."""
+        """Return one guard of a profile."""
         return cls(
             speed=profile.draw_speed(rng),
             mobilisation=profile.mobilisation_s.draw(rng),
@@ -149,7 +152,7 @@ class Occupant:
 
     @classmethod
     def draw(cls, profile: BystanderProfile, rng: np.random.Generator) -> Occupant:
-        """One bystander of a profile."""
+        """Return one bystander of a profile."""
         return cls(
             speed=profile.draw_speed(rng),
             premovement=profile.premovement_s.draw(rng),

@@ -327,5 +327,5 @@ class Walking:
 
 
 def _gap(one: Body, other: Body) -> float:
-    """Between two bodies [m]."""
+    """Return the gap between two bodies [m]."""
     return math.dist((one.x, one.y), (other.x, other.y)) - one.radius - other.radius

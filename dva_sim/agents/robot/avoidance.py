@@ -106,7 +106,7 @@ class Avoidance:
     def lane(
         self, route: Route, along: float, here: Point, others: Sequence[Nearby], last: float
     ) -> Lane | Blocked:
-        """The best free lane ahead, or who is in the way.
+        """Return the best free lane ahead, or who is in the way.
 
         Args:
             route: The planned way.
@@ -164,7 +164,7 @@ class Avoidance:
     def _are_free(
         self, points: Floats, places: Floats, others: Sequence[Nearby]
     ) -> tuple[Floats, NDArray[np.bool_]]:
-        """Gaps between surfaces to everybody, `(others, k, n)` [m], and where they suffice.
+        """Return gaps between surfaces to everybody, `(others, k, n)` [m], and where they suffice.
 
         A gap that is too small already may grow.
 
@@ -183,7 +183,9 @@ class Avoidance:
         return gaps, np.asarray(enough.all(axis=0))
 
     def refuge(self, here: Point, route: Floats, others: Sequence[Nearby]) -> Point | None:
-        """The nearest place beside the way where one is in nobody's way; None if there is none.
+        """Return the nearest place beside the way where one is in nobody's way.
+
+        None if there is none.
 
         Args:
             here: Current position [m].
@@ -229,19 +231,22 @@ def _blocked(
 
 
 def pace_among(people: Sequence[Nearby], here: Point, radius: float, speed: float) -> float:
-    """The speed that suits the nearest person: slower from `SOCIAL` on, crawling at `PERSONAL`."""
+    """Return the speed that suits the nearest person.
+
+    Slower from `SOCIAL` on, crawling at `PERSONAL`.
+    """
     gaps = [math.dist(here, (p.x, p.y)) - radius - p.radius for p in people if p.kind == "person"]
     share = (min(gaps, default=SOCIAL) - PERSONAL) / (SOCIAL - PERSONAL)
     return min(speed, CREEP + max(share, 0.0) * max(speed - CREEP, 0.0))
 
 
 def _number(name: str) -> tuple[int, str]:
-    """Orders names such that robot-2 comes before robot-10."""
+    """Return orders names such that robot-2 comes before robot-10."""
     return len(name), name
 
 
 def _to_the_left(points: Floats) -> Floats:
-    """Unit vectors to the left of a line, shape `(n, 2)`."""
+    """Return the unit vectors to the left of a line, shape `(n, 2)`."""
     ahead = _gradient(points) if len(points) > 1 else np.array([[1.0, 0.0]])
     length = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
     return np.asarray(np.stack([-ahead[:, 1], ahead[:, 0]], 1) / length)

@@ -60,7 +60,7 @@ _make_nearby = maker(Nearby)
 def who_is_near(
     world: World, body: RobotBody, within: float, sees: Callable[[Point, Point], bool]
 ) -> tuple[Nearby, ...]:
-    """Everybody in sight, the nearest first; tracked, so that velocities are known.
+    """Return everybody in sight, the nearest first; tracked, so that velocities are known.
 
     Args:
         body: Robot whose sensors look.
@@ -117,7 +117,7 @@ class CollisionGuard:
         turn_rate: float,
         others: Sequence[Nearby] = (),
     ) -> float:
-        """The speed at which the robot can still stop before contact; never above `speed`.
+        """Return the speed at which the robot can still stop before contact; never above `speed`.
 
         Args:
             pose: Position and heading [m, rad].
@@ -140,7 +140,7 @@ class CollisionGuard:
         return 0.0
 
     def stopping_distance(self, speed: float) -> float:
-        """From asking for a stop to standing [m]."""
+        """Return the distance from asking for a stop to standing [m]."""
         return speed * REACTION + speed**2 / (2.0 * self.deceleration)
 
     def free_way(
@@ -174,13 +174,16 @@ class CollisionGuard:
 
 
 def _first(found: NDArray[np.bool_]) -> int:
-    """Place of the first true value; the length if there is none."""
+    """Return the place of the first true value; the length if there is none."""
     at = int(found.argmax())
     return at if found[at] else len(found)
 
 
 def _arc(pose: tuple[float, float, float], curvature: float, way: Floats) -> Floats:
-    """Points `(n, 2)` along an arc that begins at a pose; `curvature` [1/m], `way` `(n,)` [m]."""
+    """Return points `(n, 2)` along an arc that begins at a pose.
+
+    `curvature` [1/m], `way` `(n,)` [m].
+    """
     x, y, heading = pose
     half = 0.5 * curvature * way
     chord = way * np.sinc(half / math.pi)

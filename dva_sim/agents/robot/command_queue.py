@@ -129,7 +129,10 @@ class FairQueue:
         return gone
 
     def _make_room(self, letter: Letter, standing: Standing) -> Letter | None:
-        """The one that has to go for a letter, if any: another, which is gone then, or itself."""
+        """Return the one that has to go for a letter, if any.
+
+        Another, which is gone then, or itself.
+        """
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
         if standing is not HOLDER and sum(mine) >= EACH:
             return letter
@@ -147,7 +150,7 @@ class FairQueue:
         return self._standing(line[0]), len(line)
 
     def next_lines(self) -> dict[Standing, LineOf]:
-        """The line whose turn it is, of each standing that waits.
+        """Return the line whose turn it is, of each standing that waits.
 
         The holder's control comes before its commands. With strangers that would let some keep
         others out.
@@ -161,7 +164,7 @@ class FairQueue:
         return lines
 
     def pop(self, key: LineOf) -> Letter:
-        """The next one of a line, which then waits until all others have had their turn."""
+        """Return the next one of a line, which then waits until all others have had their turn."""
         self._lines.move_to_end(key)
         return self._take(key)
 
@@ -254,7 +257,7 @@ class CommandQueue:
         return at_work or self._waiting.has(DVA)
 
     def request(self, request: Request) -> None:
-        """A request has arrived; somebody waits for the answer."""
+        """Take a request whose sender waits for the answer."""
         data = request.data
         message = None
         looks_urgent = b"<EmergencyMsg" in data
@@ -273,12 +276,12 @@ class CommandQueue:
         self._put(_make_letter(data, self._clock.now, request, message, moves), urgent)
 
     def _has_room(self, peer: Hashable) -> bool:
-        """For one more emergency; those that wait will stop the robot as well."""
+        """Return True with room for one more emergency; those that wait stop the robot as well."""
         of_peer = sum(letter.peer == peer for letter in self._emergencies)
         return of_peer < EACH and len(self._emergencies) < self._limit
 
     def published(self, data: bytes, message: Message | None = None) -> None:
-        """A command has arrived that nobody waits to be answered; who has read it, says so."""
+        """Take a command that nobody waits to be answered; its reader says so."""
         if self.latest_wins:
             self.superseded += self.forget_published()
         self._put(_make_letter(data, self._clock.now, None, message, True))
@@ -346,7 +349,7 @@ class CommandQueue:
         return True
 
     def _next(self) -> list[Letter]:
-        """Emergencies, all in one, unless it is the turn of somebody else."""
+        """Return emergencies, all in one, unless it is the turn of somebody else."""
         if not (self._emergencies or self._waiting.length):
             self._was_urgent = False
             return []
@@ -356,7 +359,7 @@ class CommandQueue:
         return self._emergencies if letter is None else [letter]
 
     def _next_of_others(self) -> Letter | None:
-        """The holder's after each of another; the DVA and strangers by turns."""
+        """Return the holder's after each of another; the DVA and strangers by turns."""
         if not self._waiting.length:
             return None
         lines = self._waiting.next_lines()
@@ -390,7 +393,7 @@ class CommandQueue:
             self._work()
 
     def _finish(self, letters: list[Letter]) -> None:
-        """Processing is done; an emergency that came meanwhile is done with, too."""
+        """Finish processing, and any emergency that came meanwhile."""
         if letters is self._emergencies:
             self._emergencies = []
         for letter in letters:

@@ -129,7 +129,7 @@ class RobotController:
     _numbered: int = 0  # the session that `last_order_id` and `last_set_id` are of
 
     def tick(self, now: float) -> int:
-        """The robot's own clock [ms]."""
+        """Return the robot's own clock [ms]."""
         return round((now + self.clock_offset) * 1000)
 
     def handle(
@@ -227,7 +227,7 @@ class RobotController:
     # --- by hand, at the robot itself ---------------------------------------------------
 
     def take_by_hand(self, who: str, now: float, moving: bool) -> Decision:
-        """Somebody at the robot is going to drive it, without a message and without a session.
+        """Let somebody at the robot drive it, without a message and without a session.
 
         Only a robot that is idle and that nobody holds can be taken so; from then on it is busy
         for everybody else, until it is let go, an emergency comes, or nothing is heard for long.
@@ -253,7 +253,7 @@ class RobotController:
         return Decision(m.OK, set_point=STAND)
 
     def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
-        """A set point of whom the robot is in the hands of; in force until the watchdog.
+        """Return a set point of whom the robot is in the hands of; in force until the watchdog.
 
         Args:
             who: Person, by the name under which the robot was taken.
@@ -295,14 +295,14 @@ class RobotController:
         return Decision(m.OK, "released")
 
     def let_go(self, who: str) -> Decision:
-        """The hand that drove gives the robot up; another one's word changes nothing."""
+        """Give the robot up; the word of a hand that did not drive changes nothing."""
         if self.by_hand is None or self.by_hand != who:
             return Decision(m.WRONG_MODE, "it is not in this hand")
         self._idle("")
         return Decision(m.OK, set_point=STAND)
 
     def mission_changed(self, state: str, left: int, reason: str) -> bool:
-        """The robot says how its mission goes on; True if that is news.
+        """Hear from the robot how its mission goes on; return True if that is news.
 
         Args:
             state: State as in `MissionStatus`; `done` and `failed` end the mission.
@@ -336,7 +336,10 @@ class RobotController:
         return Decision(m.OK, "takes effect when the DVA has confirmed it")
 
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
-        """A grant is a reason to ask the DVA: it takes effect when that has confirmed it (S2)."""
+        """Take a grant as a reason to ask the DVA.
+
+        It takes effect when that has confirmed it (S2).
+        """
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
         if body.level == "sensors":
@@ -347,7 +350,7 @@ class RobotController:
         return Decision(m.OK, "takes effect when the DVA has confirmed it")
 
     def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
-        """A session is over, or is said to be: it ends at once, and the DVA may restore it.
+        """End a session that is over, or said to be, at once; the DVA may restore it.
 
         A forged revocation stops a drive, as an emergency would, but takes the robot from nobody.
         """
@@ -434,7 +437,10 @@ class RobotController:
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
-        """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
+        """Take an offer, or an award, which moves nothing.
+
+        An operator has to drive.
+        """
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
         if isinstance(message.body, m.TaskAward) and self.latch.holds:

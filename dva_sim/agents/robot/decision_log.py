@@ -64,7 +64,7 @@ class DecisionLog:
         decision: Decision,
         waited: bool = False,
     ) -> None:
-        """A message was decided on; arguments as of `RobotController.handle`."""
+        """Note the decision on a message; arguments as of `RobotController.handle`."""
         values = {"arrived": arrived, "now": now, "moving": moving}
         values |= {"waited": True} if waited else {}
         point = decision.set_point
@@ -79,11 +79,11 @@ class DecisionLog:
         )
 
     def happened(self, what: str, now: float) -> None:
-        """Time, the world or a hand at the robot changed what it does: one of the words above."""
+        """Note what time, the world or a hand at the robot changed: one of the words above."""
         self._write({"happened": what, "now": now})
 
     def close(self) -> None:
-        """Nothing more will be decided."""
+        """Close the log: nothing more will be decided."""
         if self._file is not None:
             self._file.close()
 

@@ -56,7 +56,7 @@ class RobotFaults:
         self._tell(f"fault: processing of a message takes {text}")
 
     def usually(self, service: Callable[[], float]) -> None:
-        """From now on a message usually takes another time: what counts while nothing is wrong."""
+        """Let a message usually take another time from now on: what counts if nothing is wrong."""
         self._usual = service
         if self.processing_s is None:
             self._robot.inbox.service = service

@@ -64,7 +64,7 @@ class CollisionGuardedDrive:
         self._looking = False
 
     def take(self, wanted: TimedSetPoint) -> None:
-        """A new set point: in force at once, and guarded until it expires."""
+        """Take a new set point: in force at once, and guarded until it expires."""
         self._wanted = wanted
         if self._looking:
             self._apply()

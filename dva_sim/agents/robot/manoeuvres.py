@@ -105,7 +105,7 @@ class JamRecovery(Manoeuvre):
         self.heading = self._way_out(seen, tried)
 
     def _way_out(self, seen: Sensed, tried: Sequence[float]) -> float:
-        """The freest heading; the less to turn, the better where several are free."""
+        """Return the freest heading; the less to turn, the better where several are free."""
 
         def worth(heading: float) -> float:
             pose = (*seen.here, heading)
@@ -117,7 +117,7 @@ class JamRecovery(Manoeuvre):
         return max((seen.view.heading + turn for turn in turns), key=worth)
 
     def step(self, seen: Sensed) -> Intent | None:
-        """Turn, then drive; over when far enough away, or when it takes too long."""
+        """Turn, then drive; return True when far enough away, or when it takes too long."""
         if seen.now > self._until or math.dist(seen.here, self._start) > GET_AWAY:
             return None
         self._turned = self._turned or abs(wrap(self.heading - seen.view.heading)) < FACING
@@ -249,7 +249,7 @@ class Inspection:
         return near and self._sees(seen.here, self._place)
 
     def _in_view(self, seen: Sensed) -> SeenHazard | None:
-        """The event, if it is in the picture."""
+        """Return the event, if it is in the picture."""
         found = [
             h
             for h in seen.view.hazards

@@ -25,7 +25,7 @@ class ManualControl:
         return self._robot.controller
 
     def take(self, who: str) -> Decision:
-        """Somebody takes the robot in hand, if it is idle and nobody holds it."""
+        """Let a person take the robot in hand, if it is idle and nobody holds it."""
         robot = self._robot
         now = self._robot.device.clock.now
         if robot.device.silent or not robot.body.powered:
@@ -41,7 +41,7 @@ class ManualControl:
         return decision
 
     def drive(self, who: str, speed: float, turn_rate: float) -> Decision:
-        """The hand wants a speed [m/s] and a turn rate [rad/s]."""
+        """Take the speed [m/s] and turn rate [rad/s] that the hand wants."""
         robot = self._robot
         now = self._robot.device.clock.now
         if robot.device.silent:
@@ -52,7 +52,7 @@ class ManualControl:
         return decision
 
     def let_go(self, who: str) -> Decision:
-        """The hand gives the robot up, which stops it."""
+        """Stop the robot, which the hand gives up."""
         robot = self._robot
         now = self._robot.device.clock.now
         decision = self._controller.let_go(who)

@@ -57,7 +57,7 @@ class MissionGoal:
     def of(
         cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point
     ) -> MissionGoal:
-        """The errand that a message asks for; `base` is the robot's own [m]."""
+        """Return the errand that a message asks for; `base` is the robot's own [m]."""
         match mission:
             case m.Inspect():
                 place = to_xy(mission.position.latitude, mission.position.longitude)
@@ -206,7 +206,7 @@ class Pilot:
         return self._move(seen, self._drive(Route(lane.points), seen), "under_way")
 
     def _drive(self, route: Route, seen: Sensed) -> Intent:
-        """Along a way; a car drives its sharpest curve where others turn on the spot."""
+        """Return the way's next intent; a car drives its sharpest curve where others turn."""
         speed, turn_rate = self._driver.drive(route, View(seen.now, seen.view, PERIOD), NEAR)
         return Intent(
             max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate

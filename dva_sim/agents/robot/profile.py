@@ -98,7 +98,7 @@ class RobotProfile(Config):
 
 @read_once(lambda name: [resources.find(name, FOLDER)])
 def load_robot(name: str) -> RobotProfile:
-    """The profile of a name or path.
+    """Return the profile of a name or path.
 
     Raises:
         ConfigError: not found, or not valid.
@@ -107,7 +107,7 @@ def load_robot(name: str) -> RobotProfile:
 
 
 def read_robot(document: Document) -> RobotProfile:
-    """The profile in a file; a drive in a file beside it is found from anywhere.
+    """Return the profile in a file; a drive in a file beside it is found from anywhere.
 
     Raises:
         ConfigError: it is not valid.

@@ -230,7 +230,7 @@ class RobotAgent:
         )
 
     def expect(self, pattern: Pattern) -> None:
-        """From the next drive on, commands come by another pattern.
+        """Take commands by another pattern, from the next drive on.
 
         Raises:
             RuntimeError: it is driven now.
@@ -345,7 +345,7 @@ class RobotAgent:
     # --- messages ----------------------------------------------------------------------
 
     def _admit(self, request: Request) -> m.Message | None:
-        """A request that is worth waiting for; without power it hears none.
+        """Return a request that is worth waiting for; without power it hears none.
 
         While somebody drives, what only that one may say is refused to strangers before it costs
         any processing, unless a word of the DVA waits that may make one of them the holder.
@@ -378,14 +378,14 @@ class RobotAgent:
         return self.controller.mode is TELEOPERATION
 
     def _turn_away(self, letter: Letter) -> None:
-        """There is no room for a letter."""
+        """Turn away a letter, as the queue is full."""
         if letter.request is not None and not self.device.silent:
             answers = letter.message.message_id if letter.message is not None else 0
             refusal = m.Reply(answers, m.BUSY, "too many of your messages wait")
             self.device.turn_away(letter.request, letter.message, refusal)
 
     def _published(self, data: bytes) -> None:
-        """A command has arrived of the one who drives; what is none takes no time."""
+        """Take a published command of the driver; anything else takes no time."""
         message = None if self.device.silent else self.device.read(data, self.controller.owner)
         if message is None:
             return
@@ -395,7 +395,7 @@ class RobotAgent:
             self.device.recorder.counters["refused: to another device"] += 1
 
     def _handle(self, letter: Letter) -> None:
-        """A letter's processing is done."""
+        """Handle a letter whose processing is done."""
         if self.device.silent or letter.message is None:
             return
         if letter.request is None:
@@ -475,7 +475,7 @@ class RobotAgent:
         return None
 
     def _dva_answered(self, reply: m.Reply) -> Decision:
-        """The DVA has answered what it was asked, over a connection of the robot's own."""
+        """Take the DVA's answer, over a connection of the robot's own."""
         me = self.device.id_tag
         dva = self.device.dva
         answer = m.Message(me, 1, dva, "00:00:00", 0, reply)
@@ -682,7 +682,7 @@ class RobotAgent:
         self.device.publish(MISSION, self.controller.mission_status)
 
     def _mission_news(self) -> None:
-        """The mission stands otherwise than before; it may be over."""
+        """Note that the mission stands otherwise than before; it may be over."""
         status = self.controller.mission_status
         self._publish_mission()
         if status.mission_state in ENDS:

@@ -57,7 +57,7 @@ class SensorPort:
 
 
 def sensor_topic(sensor: str, subscriber: str) -> str:
-    """Topic of the values of a sensor for one subscriber."""
+    """Return the topic of the values of a sensor for one subscriber."""
     return f"sensor/{sensor}/{subscriber}|"
 
 
@@ -257,7 +257,7 @@ class SensorConfig(Config):
         return self
 
     def as_kind(self) -> SensorKind:
-        """The kind of sensor with what is said here."""
+        """Return the kind of sensor with what is said here."""
         usual = KINDS[self.name]
         settings = (self.noise, self.resolution, self.low, self.high, self.lag_s)
         pairs = zip(settings, usual[1:], strict=True)
@@ -291,7 +291,7 @@ class RobotSensor:
         self._noise: tuple[int, Floats] = -1, np.empty(0)
 
     def read(self, now: float) -> Values:
-        """Its newest sample; nothing if it is lost.
+        """Return its newest sample; nothing if it is lost.
 
         Args:
             now: Time [s], never less than before.
@@ -312,7 +312,7 @@ class RobotSensor:
         return self._shown
 
     def _follow(self, truth: Floats, now: float) -> Floats:
-        """The lag: exact where what is there has been the same since the last sample."""
+        """Return the lag: exact where what is there has been the same since the last sample."""
         if self.kind.lag <= 0.0:
             return truth
         if len(self._lagged) != len(truth):
@@ -323,7 +323,7 @@ class RobotSensor:
         return self._lagged
 
     def _normals(self, sample: int, count: int) -> Floats:
-        """Standard normal numbers of one sample, shape `(count,)`."""
+        """Return standard normal numbers of one sample, shape `(count,)`."""
         block, place = divmod(sample, BLOCK)
         if self._noise[0] != block or self._noise[1].shape[1] != count:
             self._noise = block, self._streams(f"noise {block}").normal(size=(BLOCK, count))
@@ -334,7 +334,7 @@ class Around(Protocol):
     """Conditions at a place: the hazards of a run."""
 
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """The conditions at a point [m] and time [s]."""
+        """Return the conditions at a point [m] and time [s]."""
 
 
 def sources_of(
@@ -375,7 +375,7 @@ def sources_of(
 def make_ports(
     configs: Iterable[SensorConfig], sources: Mapping[str, Source], streams: StreamsByName
 ) -> dict[str, SensorPort]:
-    """The sensors of a robot, ready to be subscribed to.
+    """Return the sensors of a robot, ready to be subscribed to.
 
     Args:
         configs: Sensors to make.

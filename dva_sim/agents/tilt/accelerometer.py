@@ -81,7 +81,7 @@ class AccelerometerPart(Config):
 
 @read_once(lambda name: [resources.find(name, FOLDER)])
 def load_part(name: str) -> AccelerometerPart:
-    """The part of that name, or in that file.
+    """Return the part of that name, or in that file.
 
     Raises:
         ConfigError: there is none, or it cannot be read.
@@ -162,7 +162,7 @@ class Accelerometer:
         return _cut(x, most), _cut(y, most), _cut(z, most)
 
     def _drawn(self, rng: np.random.Generator, noise: float, block: int) -> Iterator[list[float]]:
-        """Noise and drift of each sample [m/s^2]."""
+        """Yield the noise and drift of each sample [m/s^2]."""
 
         def blocks() -> Iterator[list[list[float]]]:
             drift = np.zeros(3)
@@ -180,7 +180,7 @@ class Accelerometer:
 def _intervals(
     rng: np.random.Generator, period: float, jitter: float, block: int
 ) -> Iterator[float]:
-    """From each sample to the next [s]: how late one is, is cut off so that none overtakes another.
+    """Yield times between samples [s], lateness cut off so that none overtakes another.
 
     It is in ticks of a clock.
     """

@@ -25,7 +25,7 @@ _TICK: Final = 1e-6  # design: a look by a clock that rounds may come so much to
 
 
 def calibrated(profile: PhoneProfile, reference: Triple) -> Calibration:
-    """The app's calibration by a reference pose: x, y, z [m/s^2]."""
+    """Return the app's calibration by a reference pose: x, y, z [m/s^2]."""
     return Calibration(
         reference,
         speed_step=profile.speed_step_mps2,
@@ -73,7 +73,7 @@ class Trail:
         self.begin(0.0)
 
     def begin(self, now: float) -> None:
-        """A drive begins; what is behind the tilt until a picture is followed counts from now."""
+        """Begin a drive; what is behind the tilt until a picture is followed counts from now."""
         self._filter = self._make_filter()
         # Since the beginning, as empty slots of a filter hold a zero.
         self._begun = now
@@ -81,20 +81,23 @@ class Trail:
         self._hand = 0.0
 
     def follow(self, captured: float) -> None:
-        """From now on the hand follows what a picture captured at that time [s] led to."""
+        """Let the hand follow what a picture captured at that time [s] led to, from now on."""
         self._asked = captured - self._begun
 
     def move(self, decay: float) -> float:
-        """The hand moves by a sample that the filter does not take; what it would take of it."""
+        """Return the hand moves by a sample that the filter does not take.
+
+        What it would take of it.
+        """
         self._hand = self._asked + (self._hand - self._asked) * decay
         return self._hand
 
     def take(self, hand: float) -> None:
-        """The filter takes such a sample after all."""
+        """Let the filter take such a sample after all."""
         self._filter.add((hand, hand))
 
     def sample(self, count: int, decay: float) -> None:
-        """So many samples; from each to the next the hand keeps the share `decay`."""
+        """Take so many samples; from each to the next the hand keeps the share `decay`."""
         asked = self._asked
         hand = self._hand
         add = self._filter.add
@@ -191,12 +194,12 @@ class TiltApp:
             self._take_value(at)
 
     def take_values(self, now: float) -> None:
-        """Values that were due although no batch was complete."""
+        """Take values that were due although no batch was complete."""
         while self._due <= now + TIE and not (self._on_sample or self._held):
             self._take_value(self._due)
 
     def hold(self) -> None:
-        """A request is open from now on: until `release`, no sample is looked at.
+        """Hold a request open: until `release`, no sample is looked at.
 
         The founding document sends from within the call that takes a sample (figure 5.8). What
         becomes of the samples meanwhile it does not say: they are dropped, or they queue and are
@@ -205,13 +208,13 @@ class TiltApp:
         self._held = True
 
     def release(self, now: float) -> None:
-        """The request was answered: the time to the next value counts from here."""
+        """Release the answered request: the time to the next value counts from here."""
         self._advance(now)
         self._held = False
         self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def followed(self, captured: float) -> None:
-        """From now on the samples are by a picture that was captured at that time [s]."""
+        """Let samples be by a picture that was captured at that time [s], from now on."""
         self._trail.follow(captured)
 
     def next_look(self, now: float, rate_hz: float) -> float:
@@ -229,7 +232,7 @@ class TiltApp:
         return min(math.ceil((due - TIE / 2) / _TICK) * _TICK, complete + _TICK)
 
     def look(self, now: float) -> TiltCommand | None:
-        """The command to send at `now`, or None if there is nothing new to say."""
+        """Return the command to send at `now`, or None if there is nothing new to say."""
         self._advance(now)
         command = self._command(now)
         while command is None and self._queue and not self._held:
@@ -272,7 +275,7 @@ class TiltApp:
         return self._heard_at + self._period
 
     def _advance(self, now: float) -> None:
-        """All that was due by now."""
+        """Advance by all that was due by now."""
         if self._queue and not self._held:
             self._work_off(now)
         self.take_values(now)
@@ -287,7 +290,7 @@ class TiltApp:
             self._watch(passed)
 
     def _miss(self, at: float, reading: Reading) -> None:
-        """A sample comes while a request is open."""
+        """Miss a sample that comes while a request is open."""
         hand = self._trail.move(self._decay)
         if self._queues:
             self._queue.append((at, reading, hand))
@@ -308,7 +311,7 @@ class TiltApp:
             self.shown = self._mapping.command(*self._filter.value(), dt)
 
     def _take_value(self, at: float) -> None:
-        """A batch is complete, or its time is over."""
+        """Take the value of a batch that is complete, or whose time is over."""
         self.samples += self._fresh
         self.values += 1
         reading = self._filter.value()

@@ -52,7 +52,10 @@ class Calibration:
         return (ax - self._x) / self._speed_step, (ay - self._y) / self._turn_step
 
     def pose(self, level: float, turn: float) -> tuple[float, float]:
-        """The angles that read so on a perfect part: pitch, roll [rad]; the nearest there are."""
+        """Return the angles that read so on a perfect part.
+
+        Pitch, roll [rad]; the nearest there are.
+        """
         along = _share(self._x + level * self._speed_step, GRAVITY)
         pitch = math.asin(along)
         flat = GRAVITY * math.sqrt(1.0 - along * along)

@@ -52,7 +52,7 @@ class Filter(ABC):
 
     @abstractmethod
     def value(self) -> Reading:
-        """The filtered value now; before the first sample, zero."""
+        """Return the filtered value now; before the first sample, zero."""
 
     @property
     def age(self) -> float:
@@ -107,7 +107,7 @@ class BatchMedian(Filter):
             self._filled += 1
 
     def value(self) -> Reading:
-        """The median of the buffer; the next batch begins."""
+        """Return the median of the buffer; the next batch begins."""
         self._filled = 0
         if self._in_place:
             self._speed.sort()
@@ -237,7 +237,7 @@ FILTERS: Final[dict[str, Callable[..., Filter]]] = {
 
 
 def _usable(filter_: Filter) -> Filter:
-    """One of a user's, if a phone could work with it."""
+    """Return one of a user's, if a phone could work with it."""
     check_filter(filter_)
     return filter_
 

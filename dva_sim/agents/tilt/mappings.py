@@ -37,7 +37,7 @@ class Mapping(ABC):
 
     @abstractmethod
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """The command now, which is also what the display shows.
+        """Return the command now, which is also what the display shows.
 
         Args:
             level: Level of the reading.
@@ -50,7 +50,7 @@ class Mapping(ABC):
 
     @abstractmethod
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        """The reading that a practised hand tilts to.
+        """Return the reading that a practised hand tilts to.
 
         Args:
             wanted: Desired command; a level below 0 means: surely stand.
@@ -59,7 +59,7 @@ class Mapping(ABC):
         """
 
     def begin(self) -> None:  # noqa: B027 - most mappings have nothing to forget
-        """A drive begins: what was integrated is forgotten."""
+        """Begin a drive: forget what was integrated."""
 
 
 class AbsoluteMapping(Mapping):
@@ -200,19 +200,19 @@ class SlewMapping(AbsoluteMapping):
 
 # --- parts of mappings -----------------------------------------------------------------
 def outside(value: float, zone: float) -> float:
-    """By how much a value is outside a zone around zero."""
+    """Return by how much a value is outside a zone around zero."""
     if zone == 0.0:
         return value
     return math.copysign(max(abs(value) - zone, 0.0), value)
 
 
 def beyond(value: float, zone: float) -> float:
-    """The inverse of `outside`: a value that is so much outside; zero stays zero."""
+    """Return the inverse of `outside`: a value that is so much outside; zero stays zero."""
     return value + math.copysign(zone, value) if value else 0.0
 
 
 def limited(level: float, turn: float) -> Reading:
-    """Within what a command can be: no reverse, and the limits of speed and turn rate."""
+    """Return a reading within what a command can be: no reverse, and limits of both rates."""
     return (
         0.0 if level < 0.0 else LEVELS if level > LEVELS else level,
         -MAX_TURN_DEG if turn < -MAX_TURN_DEG else MAX_TURN_DEG if turn > MAX_TURN_DEG else turn,

@@ -102,7 +102,7 @@ class Phone(TiltApp):
         self.pick_up(0.0)
 
     def _time_to_close(self, holder: Person) -> float:
-        """In what time a gap on the display is closed [s]."""
+        """Return the time in which a gap on the display is closed [s]."""
         if self._batch is not None:
             held = min(self._app.max_delay, self._batch * self._period)
         else:
@@ -156,7 +156,7 @@ class Phone(TiltApp):
     # --- what happens meanwhile --------------------------------------------------------
 
     def _advance(self, now: float) -> None:
-        """All samples and values that were due."""
+        """Advance by all samples and values that were due."""
         end = now + TIE
         if (self._sample_at > end and self._due > end) or self._ideal:
             return
@@ -181,7 +181,7 @@ class Phone(TiltApp):
                 self._take_value(self._due)
 
     def _sample_until(self, end: float) -> None:
-        """Samples that are due, or until a batch is complete: hand, part, calibration, filter."""
+        """Take samples that are due, or until a batch is complete: hand, calibration, filter."""
         step = self._hand.step
         sample = self._accelerometer.sample
         interval = self._interval
@@ -213,7 +213,7 @@ class Phone(TiltApp):
         self._fresh = fresh
 
     def _miss_until(self, end: float) -> None:
-        """Samples that come while a request is open: the hand moves on, and the app is busy."""
+        """Miss samples that come while a request is open: the hand moves on, the app is busy."""
         rest_pitch, rest_roll = self._rest
         while self._sample_at <= end:
             if self._watches:
@@ -226,12 +226,12 @@ class Phone(TiltApp):
             self._sample_at += self._step
 
     def _watch(self, dt: float) -> None:
-        """The person sees the display, too."""
+        """Show the display to the person, too."""
         super()._watch(dt)
         self._perceived.append(self.shown)
 
     def _aim_at(self, perceived: Reading) -> Reading:
-        """Angles away from rest that the hand aims at [rad]."""
+        """Return angles away from rest that the hand aims at [rad]."""
         reading = self._mapping.tilt_for(self._wanted, perceived, self._within)
         pitch, roll = self._felt.pose(*reading)
         return pitch - self._rest[0], roll - self._rest[1]

@@ -62,11 +62,11 @@ class TiltSources:
         self._given.ask(now, speed, turn_rate)
 
     def let_go(self) -> None:
-        """Nobody holds the stick any more: the next sample acts, if one comes."""
+        """Let go of the stick: the next sample acts, if one comes."""
         self._given_at = -math.inf
 
     def next_look(self, now: float, rate_hz: float) -> float:
-        """Time of the next look [s]."""
+        """Return the time of the next look [s]."""
         return self._acting.next_look(now, rate_hz)
 
     def look(self, now: float) -> TiltCommand | None:

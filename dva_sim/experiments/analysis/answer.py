@@ -143,7 +143,7 @@ class Finding:
 
 
 def too_few(persons: int, cluster: str = "person") -> str:
-    """`too few persons (4) to tell`."""
+    """Return `too few persons (4) to tell`."""
     return f"too few {cluster}s ({persons}) to tell"
 
 
@@ -162,7 +162,7 @@ class Answer:
     notes: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        """To be read: the answer in lines, and how much more there is to know."""
+        """Return the answer in lines, and how much more there is to know."""
         lines = wrap(self.lead, 100)
         more = f"notes: {len(self.notes)}" if self.notes else ""
         return "\n".join([*lines, more] if more else lines)

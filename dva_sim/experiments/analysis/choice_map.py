@@ -142,7 +142,10 @@ class ChoiceMap:
         return np.asarray(self.mean >= self.most)
 
     def best_of(self, situation: int) -> list[Level]:
-        """The choices that are not clearly worse than the best; all where nothing differs."""
+        """Return the choices that are not clearly worse than the best.
+
+        All where nothing differs.
+        """
         return [
             level
             for level, worse in zip(self.choice.levels, self.is_worse[situation], strict=True)
@@ -197,7 +200,10 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
 
 
 def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArray[Any]:
-    """A grid with the three factors first, in this order; other factors must have one level."""
+    """Return a grid with the three factors first, in this order.
+
+    Other factors must have one level.
+    """
     names = [factor.name for factor in part.factors]
     order = [names.index(factor.name) for factor in axes]
     rest = [n for n in range(grid.ndim) if n not in order]

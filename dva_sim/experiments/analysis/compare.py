@@ -28,7 +28,7 @@ class Comparison(MatchedResults):
     def differences(
         self, measure: str | None = None, by: Sequence[str] | None = ()
     ) -> list[Difference]:
-        """A measure's difference in every group of cells that has a value; see `groups`.
+        """Return a measure's difference in every group of cells that has a value; see `groups`.
 
         Raises:
             ConfigError: no such measure or factor, or one in words.
@@ -51,7 +51,7 @@ class Comparison(MatchedResults):
         return judge(parse(fail_if), self)
 
     def changed(self) -> tuple[list[str], int]:
-        """Measures that are not the same in every pair of runs, and how many there are in all.
+        """Return measures that differ in some pair of runs, and how many there are in all.
 
         None if no runs have the same random numbers.
         """

@@ -100,7 +100,7 @@ class Endings:
         return self._grid.at(wanted)
 
     def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
-        """Shares by the horizon, each with its 95 % interval over persons."""
+        """Return shares by the horizon, each with its 95 % interval over persons."""
         mask = self.under(line, stop, panel)
         way = self.way[mask]
         time = self.time[mask]
@@ -150,14 +150,14 @@ _OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}
 
 
 def horizon_of(view: StudyView, scenario: Mapping[str, Any]) -> float:
-    """Until when an ending counts [s]: as long as events are followed, or a run lasts."""
+    """Return until when an ending counts [s]: as long as events are followed, or a run lasts."""
     if view.part.has("follow_s"):
         return float(np.nanmax(as_floats(view.part.treated["follow_s"])))
     return float(scenario.get("horizon_s", math.inf))
 
 
 def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Floats]:
-    """First outcome of each event, and its time since the report [s]."""
+    """Return the first outcome of each event, and its time since the report [s]."""
     outcome = rows["outcome"].astype(str)
     way = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
     way = np.where((way == "escalated") & (drives != ""), drives, way)

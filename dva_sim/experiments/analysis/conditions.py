@@ -22,7 +22,7 @@ _OF_WAITING = (
 def conditions(
     scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor], also: Sequence[str] = ()
 ) -> list[tuple[str, list[str]]]:
-    """Each condition with its value in every part, and `varied` where it is a factor.
+    """Return each condition with its value in every part, and `varied` where it is a factor.
 
     Args:
         scenarios: Those of the parts.
@@ -47,7 +47,7 @@ def conditions(
 
 
 def get(scenario: Mapping[str, Any], key: str) -> Any:
-    """The value at a dotted key; None where there is none."""
+    """Return the value at a dotted key; None where there is none."""
     value: Any = scenario
     for name in key.split("."):
         value = value.get(name) if isinstance(value, Mapping) else None
@@ -101,13 +101,13 @@ def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> Request
 
 
 def _usual(of: Callable[[str], Any]) -> float | None:
-    """The time-out where nobody gives one [s]; None where that cannot be known."""
+    """Return the time-out where nobody gives one [s]; None where that cannot be known."""
     known = of("link.delay_s") is not None and of("robot.processing_s") is not None
     return time_out_s(_needed(of)[1]) if known else None
 
 
 def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
-    """The round trip, and what the first answer over a new connection takes [s]."""
+    """Return the round trip, and what the first answer over a new connection takes [s]."""
     delay = of("link.delay_s")
     processing = of("robot.processing_s")
     ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))

@@ -81,7 +81,7 @@ class Bound:
     kind: str
 
     def for_(self, first: float) -> float:
-        """The bound of the second folder's statistic, given the first one's."""
+        """Return the bound of the second folder's statistic, given the first one's."""
         return {"times": self.value * first, "more": self.value + first}.get(self.kind, self.value)
 
 
@@ -123,7 +123,7 @@ class _Reader:
         return left
 
     def take(self, kind: str, among: tuple[str, ...] = (), called: str = "") -> str:
-        """The next word, which must be of a kind.
+        """Return the next word, which must be of a kind.
 
         Raises:
             ConfigError: it is not.
@@ -134,7 +134,7 @@ class _Reader:
         return self.next()
 
     def error(self, problem: str) -> ConfigError:
-        """A mistake in the condition, at the word it has come to."""
+        """Return a mistake in the condition, at the word it has come to."""
         return ConfigError(
             f"--fail-if {self.text!r}, column {self._begin + 1}: {problem}; "
             "conditions look like p95(response_s) > 1.05x, "
@@ -197,7 +197,7 @@ def _bound(words: _Reader, unit: str) -> Bound:
 
 
 def _scaled(text: str, words: _Reader, unit: str) -> float:
-    """A number in the measure's unit, given the unit that stands after it, if any does."""
+    """Return a number in the measure's unit, given the unit that stands after it, if any does."""
     if words.kind != "name":
         return float(text)
     scales = {unit: "1"} | _SCALES.get(unit, {})
@@ -291,7 +291,7 @@ def _verdicts(
 
 
 def _missing(rows: Rows, crashed: int) -> float:
-    """Share of the rows without a value; a run that failed is one of them."""
+    """Return the share of the rows without a value; a run that failed is one of them."""
     every = len(rows.values) + crashed
     return float((np.isnan(rows.values).sum() + crashed) / every) if every else 1.0
 
@@ -308,7 +308,7 @@ def _both(gate: Gate, first: Rows, second: Rows) -> tuple[Rows, Rows]:
 
 
 def _tested(gate: Gate, rows: Rows, column: str) -> Rows:
-    """The rows with numbers for values: of a share, whether they pass its test."""
+    """Return the rows with numbers for values: of a share, whether they pass its test."""
     if gate.test is None and gate.statistic != "missing":
         return as_numbers(rows, column)
     if gate.test is not None and not isinstance(gate.test.than, str):
@@ -318,7 +318,7 @@ def _tested(gate: Gate, rows: Rows, column: str) -> Rows:
 
 
 def _passes(test: Test | None, value: Any) -> float:
-    """1 or 0, or nan for a value that is missing."""
+    """Return 1 or 0, or nan for a value that is missing."""
     if value is None or value != value:
         return math.nan
     if test is None:
@@ -344,7 +344,7 @@ def _computed(gate: Gate, rows: Rows) -> float:
 
 
 def _refuse_undecided(gate: Gate, group: GateGroup, first: float, second: float) -> None:
-    """A gate that cannot be decided must not pass for one that was."""
+    """Refuse a gate that cannot be decided: it must not pass for one that was."""
     where = f"in part {group.part}"
     needs_first = gate.bound.kind != "absolute"
     for side, value in (("first", first), ("second", second)):

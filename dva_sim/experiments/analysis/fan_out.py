@@ -48,11 +48,11 @@ class Need(NamedTuple):
         return (self.neglect + self.interaction) / self.interaction
 
     def rate_without_waiting(self, robots: int) -> float:
-        """Events per second if no robot waits until the operator has no time left."""
+        """Return events per second if no robot waits until the operator has no time left."""
         return min(robots, self.fan_out) / (self.neglect + self.interaction)
 
     def rate_with_waiting(self, robots: int) -> float:
-        """Events per second of a finite source of exponential times (M/M/1//N)."""
+        """Return events per second of a finite source of exponential times (M/M/1//N)."""
         ratio = self.interaction / self.neglect
         busier = [left * ratio for left in range(robots, 0, -1)]
         idle = 1.0 / sum(accumulate(busier, operator.mul, initial=1.0))
@@ -60,7 +60,7 @@ class Need(NamedTuple):
 
 
 def settled_per_person(results: Results, part: str, where: Setting, since: float) -> Floats:
-    """Events settled per second from a time [s] on, for each person, shape `(persons,)`.
+    """Return events settled per second from a time [s] on, for each person, shape `(persons,)`.
 
     The time before is left out: at the start every robot sets out, and nobody has anything to
     judge.

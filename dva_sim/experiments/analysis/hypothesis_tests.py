@@ -106,7 +106,7 @@ class Judgement(NamedTuple):
 
 
 def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
-    """Every comparison and every hypothesis, as the manifest has them, and what came out.
+    """Return every comparison and every hypothesis, as the manifest has them, and what came out.
 
     All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
     what speaks against hypotheses is adjusted among its own.
@@ -174,7 +174,7 @@ def verdict_of(tested: Tested) -> Verdict:
 def pairs_of(
     study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting
 ) -> PairedRuns | None:
-    """Both sides of a contrast at one place; None where it was not run."""
+    """Return both sides of a contrast at one place; None where it was not run."""
     part = part_of(study, runs, contrast.part)
     wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
     if not all(level in part.levels.get(name, ()) for name, level in wanted):
@@ -186,7 +186,7 @@ def pairs_of(
 
 
 def contrasts_of(study: Mapping[str, Any]) -> dict[str, Contrast]:
-    """The answer's contrast and the named ones."""
+    """Return the answer's contrast and the named ones."""
     named: dict[str, Contrast] = {}
     if study.get("answer"):
         named[ANSWER] = Contrast.model_validate(study["answer"])
@@ -196,7 +196,7 @@ def contrasts_of(study: Mapping[str, Any]) -> dict[str, Contrast]:
 
 
 def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
-    """The hypotheses, but for those about a contrast that is not declared."""
+    """Return the hypotheses, but for those about a contrast that is not declared."""
     declared = (study.get("hypotheses") or {}).items()
     claims = {name: Hypothesis.model_validate(claim) for name, claim in declared}
     named = contrasts_of(study)
@@ -204,7 +204,7 @@ def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
 
 
 def places_of(study: Mapping[str, Any], contrast: Contrast) -> list[Setting]:
-    """Each level that a contrast runs over, or the one place it is taken at."""
+    """Return each level that a contrast runs over, or the one place it is taken at."""
     at: Setting = dict(contrast.within)
     levels: Sequence[Level] = study.get("factors", {}).get(contrast.over, ())
     if contrast.over == POINT or not levels:  # points in ranges are like trials

@@ -100,7 +100,7 @@ def _levels(cells: _Cells, factor: str) -> tuple[Level, ...]:
 
 
 def _matched(a: _Cells, b: _Cells, key: Callable[[_Cell], Hashable]) -> dict[Address, Address]:
-    """Pairs of cells whose key is the same, and nobody else's."""
+    """Return pairs of cells whose key is the same, and nobody else's."""
     once_a = _once(a, key)
     once_b = _once(b, key)
     return {x: once_b[name] for name, x in once_a.items() if name in once_b}
@@ -116,7 +116,7 @@ def _name(cell: _Cell) -> tuple[str, Levels]:
 
 
 def _pair(a: _Cell, b: _Cell) -> Pair:
-    """The levels are those that both have, in the order of the first."""
+    """Return the levels that both have, in the order of the first."""
     common = tuple((k, v) for k, v in a["levels"].items() if b["levels"].get(k, _NOT) == v)
     return Pair(a["part"], common, a["cell"], b["cell"], a["config"] == b["config"])
 
@@ -138,15 +138,15 @@ class Rows:
     runs: list[Run]
 
     def by_run(self) -> dict[Run, Any]:
-        """The values by run; of a run with several rows the last."""
+        """Return the values by run; of a run with several rows the last."""
         return dict(zip(self.runs, self.values.tolist(), strict=True))
 
     def where(self, chosen: Array) -> Rows:
-        """Some rows, by a mask `(n,)`."""
+        """Return some rows, by a mask `(n,)`."""
         return Rows(self.values[chosen], list(compress(self.runs, chosen)))
 
     def means(self) -> dict[Run, float]:
-        """The mean of the rows of each run that has a value."""
+        """Return the mean of the rows of each run that has a value."""
         runs = sorted(set(self.runs))
         number = {run: n for n, run in enumerate(runs)}
         found, means = person_means(self.values, [number[run] for run in self.runs])
@@ -201,7 +201,7 @@ def as_numbers(rows: Rows, name: str) -> Rows:
 
 
 def difference(part: str, levels: Levels, first: Rows, second: Rows) -> Difference:
-    """The second's values minus the first's: by pairs of runs where there are any.
+    """Return the second's values minus the first's: by pairs of runs where there are any.
 
     Args:
         part: Name of the part.
@@ -233,7 +233,7 @@ def _persons(runs: Iterable[Run]) -> Array:
 
 
 def _unpaired(a: Mapping[Run, float], b: Mapping[Run, float]) -> Interval:
-    """Welch's interval on the means of persons, who are others in each folder."""
+    """Return Welch's interval on the means of persons, who are others in each folder."""
     from scipy import stats
 
     old, new = (person_means(list(means.values()), _persons(means))[1] for means in (a, b))
@@ -303,7 +303,7 @@ class MatchedResults:
         return found
 
     def find(self, measure: str | None = None) -> tuple[str, str]:
-        """Table and column of a measure: `drive_time_s`, or `events.response_s`.
+        """Return the table and column of a measure: `drive_time_s`, or `events.response_s`.
 
         A name without a table is looked for in the runs first. Without a name it is the measure
         of the declared answer.
@@ -326,7 +326,7 @@ class MatchedResults:
         return where[0], column
 
     def groups(self, by: Sequence[str] | None = ()) -> Iterator[GateGroup]:
-        """The cells in groups.
+        """Yield the cells in groups.
 
         Args:
             by: Factors whose levels tell the groups apart; none for every cell by itself,
@@ -346,7 +346,7 @@ class MatchedResults:
             yield GateGroup(part, levels, tuple(pairs))
 
     def rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
-        """The values of a column in some cells of the first (0) or second (1) folder.
+        """Return the values of a column in some cells of the first (0) or second (1) folder.
 
         Where both have runs with the same random numbers, only these are used. The cells bear the
         numbers of the first folder, so that runs can be paired.
@@ -356,7 +356,7 @@ class MatchedResults:
         return rows.where(np.array([run in shared for run in rows.runs])) if shared else rows
 
     def failed(self, side: int, group: GateGroup) -> frozenset[Run]:
-        """The runs of some cells that failed in the first (0) or second (1) folder."""
+        """Return the runs of some cells that failed in the first (0) or second (1) folder."""
         cells = group.cells(side)
         return frozenset(
             (Address.of(run)._replace(cell=cells[run["cell"]]), run["seed"])
@@ -365,14 +365,14 @@ class MatchedResults:
         )
 
     def shared(self, group: GateGroup) -> frozenset[Run]:
-        """The runs of some cells that both folders have."""
+        """Return the runs of some cells that both folders have."""
         if group not in self._same_seeds:
             first, second = (self.own_rows(side, "runs", "seed", group).runs for side in (0, 1))
             self._same_seeds[group] = frozenset(first) & frozenset(second)
         return self._same_seeds[group]
 
     def own_rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
-        """All rows of some cells in one folder, with or without a counterpart."""
+        """Return all rows of some cells in one folder, with or without a counterpart."""
         frame = self._frame(side, table, column)
         cells = group.cells(side)
         chosen = frame.where((frame["part"] == group.part) & np.isin(frame["cell"], list(cells)))
@@ -390,7 +390,7 @@ class MatchedResults:
         return self._frames[key]
 
     def refuse_distrusted(self) -> None:
-        """Nothing is said of what a user's class did that failed: the default did it.
+        """Refuse to judge what a user's class did that failed: the default did it.
 
         Raises:
             ConfigError: there is such a part.

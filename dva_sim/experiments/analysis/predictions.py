@@ -52,7 +52,7 @@ class Judged:
 
 
 def judge_all(study: Mapping[str, Any], view: StudyView | None) -> list[Judged]:
-    """Every prediction of a study, as its manifest holds it."""
+    """Return every prediction of a study, as its manifest holds it."""
     found = [Prediction.model_validate(p) for p in study.get("predictions") or ()]
     return [_judge(prediction, view) for prediction in found]
 
@@ -120,7 +120,7 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
 def _asked(
     prediction: Prediction, view: StudyView
 ) -> tuple[str, tuple[Level, Level], Setting] | None:
-    """Factor, levels and place of the contrast; None where they were not run."""
+    """Return the factor, levels and place of the contrast; None where they were not run."""
     if view.line is None:
         return None
     factor = prediction.factor or view.line.name
@@ -140,7 +140,7 @@ def _asked(
 
 
 def _chose_what_was(view: StudyView, contrast: tuple[Level, Level], where: Setting) -> bool:
-    """True if tuned and untuned runs agree in everything measured."""
+    """Return True if tuned and untuned runs agree in everything measured."""
     columns = [view.part.grid(name) for name in view.part.treated if name not in _NAMES]
     pairs = [[view.part.where(c, where | {TUNING: level}) for level in contrast] for c in columns]
     return all(np.array_equal(first, second, equal_nan=True) for first, second in pairs)
@@ -149,7 +149,7 @@ def _chose_what_was(view: StudyView, contrast: tuple[Level, Level], where: Setti
 def _measured(
     view: StudyView, factor: str, contrast: tuple[Level, Level], where: Setting
 ) -> Interval | None:
-    """The paired difference at one place."""
+    """Return the paired difference at one place."""
     first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)
     found = interval_of(first - second, view.level)
     return found if found is not None and found.n_persons > 1 else None

@@ -57,7 +57,7 @@ class Support:
 
 
 def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | None:
-    """Coverage of a part by published data; None if no control loop has a delay.
+    """Return the coverage of a part by published data; None if no control loop has a delay.
 
     Args:
         part: The runs.
@@ -82,7 +82,9 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
 
 
 def _loop_delays(part: RunGrid) -> Floats | None:
-    """Delay of each run's loop without the person [s]; None where no part of it is measured.
+    """Return the delay of each run's loop without the person [s].
+
+    None where no part of it is measured.
 
     Nan where nobody drives; infinite where no command or no picture arrives.
     """
@@ -95,7 +97,7 @@ def _loop_delays(part: RunGrid) -> Floats | None:
 
 
 def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
-    """Share of the driving time that each cell's persons moved and waited.
+    """Return the share of the driving time that each cell's persons moved and waited.
 
     Where it is not measured, only persons of the strategy `move_and_wait` count as waiting. That
     marks too many cells rather than too few.
@@ -279,7 +281,7 @@ class _Reading:
         self._outside = None if support is None else support.outside.astype(float)
 
     def own(self, where: dict[str, Level]) -> Floats | None:
-        """The difference under the study's own model; None if that was not repeated."""
+        """Return the difference under the study's own model; None if that was not repeated."""
         tried = self.part.levels.get(STRATEGY, (self._own,))
         if self._own not in tried:
             return None
@@ -287,7 +289,7 @@ class _Reading:
         return self.difference(where | strategy | {PARAMETERS: 0})
 
     def difference(self, where: dict[str, Level]) -> Floats:
-        """First minus second under a model, `(persons, trials)`."""
+        """Return the first minus second under a model, `(persons, trials)`."""
         grid = self.part.grid(self.finding.measure)
         first, second = (
             self.part.where(grid, where | {self.finding.factor: level})
@@ -296,11 +298,11 @@ class _Reading:
         return first - second
 
     def is_own(self, where: dict[str, Level]) -> bool:
-        """True if these are the strategy and parameters of the study itself."""
+        """Return True if these are the strategy and parameters of the study itself."""
         return where[PARAMETERS] == 0 and where.get(STRATEGY, self._own) == self._own
 
     def is_beyond(self, where: dict[str, Level]) -> bool:
-        """True if either side of the contrast is an extrapolation."""
+        """Return True if either side of the contrast is an extrapolation."""
         if self._outside is None:
             return False
         sides = (self.finding.first, self.finding.second)
@@ -330,7 +332,7 @@ def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
 
 
 def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
-    """The paired difference under one model; the reference run drops out of it."""
+    """Return the paired difference under one model; the reference run drops out of it."""
     own = read.own(where)
     difference = read.difference(where)
     found = interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
@@ -348,7 +350,7 @@ def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
 
 
 def _beside(finding: Finding, at: int, change: Floats) -> Interval | None:
-    """The study's own result and what a model changes of it, `(persons, trials)`."""
+    """Return the study's own result and what a model changes of it, `(persons, trials)`."""
     changed = interval_of(change)
     if changed is None or not np.isfinite(changed.low):
         return None

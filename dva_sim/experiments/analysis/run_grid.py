@@ -80,7 +80,7 @@ class RunGrid:
         return int(self._known.sum())
 
     def first_of_cells(self, column: str) -> list[Any]:
-        """A column's value in the first run of each cell, in the order of `settings`."""
+        """Return a column's value in the first run of each cell, in the order of `settings`."""
         shape = [len(f.levels) for f in self.factors]
         codes = tuple(i[self._known] for i in self._index[: len(shape)])
         cells = np.ravel_multi_index(codes, shape) if shape else np.zeros(len(self), int)
@@ -97,29 +97,32 @@ class RunGrid:
         return ran
 
     def has(self, column: str) -> bool:
-        """True if at least one run gives a number for this column."""
+        """Return True if at least one run gives a number for this column."""
         values = self.treated.get(column)
         return values is not None and bool(np.isfinite(as_floats(values)).any())
 
     def grid(self, column: str) -> Floats:
-        """One column as `(levels of factor 1, ..., persons, trials)`; nan where no run is."""
+        """Return one column as `(levels of factor 1, ..., persons, trials)`.
+
+        Nan where no run is.
+        """
         return self.laid_out(self.values(column))
 
     def values(self, column: str) -> Floats:
-        """One column, a value for each run; nan where no run of the study has any."""
+        """Return one column, a value for each run; nan where no run of the study has any."""
         if column not in self.treated:
             return np.full(len(self._known), np.nan)
         return as_floats(self.treated[column])
 
     def laid_out(self, values: Floats) -> Floats:
-        """One value for each row of `treated`, as the same grid."""
+        """Return one value for each row of `treated`, as the same grid."""
         shape = (*(len(f.levels) for f in self.factors), len(self.persons), len(self.trials))
         grid = np.full(shape, np.nan)
         grid[tuple(i[self._known] for i in self._index)] = values[self._known]
         return grid
 
     def reference(self, column: str) -> Floats:
-        """One column of the reference runs as `(persons, trials)`."""
+        """Return one column of the reference runs as `(persons, trials)`."""
         values = np.full((len(self.persons), len(self.trials)), np.nan)
         if column in self.references:
             values[self._who(self.references)] = as_floats(self.references[column])
@@ -130,15 +133,18 @@ class RunGrid:
         return np.asarray(self.grid(column) - self.reference(column))
 
     def outcome(self, column: str) -> Floats:
-        """The grid of a column as it is judged: in excess of the reference where there is one."""
+        """Return the grid of a column as it is judged.
+
+        In excess of the reference where there is one.
+        """
         return self.excess(column) if self.has_reference(column) else self.grid(column)
 
     def has_reference(self, column: str) -> bool:
-        """True if reference runs exist, so that an excess can be computed."""
+        """Return True if reference runs exist, so that an excess can be computed."""
         return bool(np.isfinite(self.reference(column)).any())
 
     def where(self, grid: NDArray[_Entry], setting: Mapping[str, Level]) -> NDArray[_Entry]:
-        """The part of a grid at some levels; the axes of the other factors stay."""
+        """Return the part of a grid at some levels; the axes of the other factors stay."""
         index = tuple(
             f.levels.index(setting[f.name]) if f.name in setting else slice(None)
             for f in self.factors
@@ -154,24 +160,27 @@ class RunGrid:
         return mask
 
     def rows_at(self, setting: Mapping[str, Level]) -> dict[str, NDArray[Any]]:
-        """Columns of the runs at some levels."""
+        """Return columns of the runs at some levels."""
         here = self.at(setting)
         return {name: values[here] for name, values in self.treated.items()}
 
     def settings(self, but: Sequence[str] = ()) -> Iterator[Setting]:
-        """Every combination of levels of the factors, except those named in `but`."""
+        """Yield every combination of levels of the factors, except those named in `but`."""
         free = [f for f in self.factors if f.name not in but]
         for levels in itertools.product(*(f.levels for f in free)):
             yield {f.name: level for f, level in zip(free, levels, strict=True)}
 
 
 def person_means(values: Floats) -> Floats:
-    """`(stops, persons, trials)` to means over trials `(persons, stops)`; nan where no trial."""
+    """Return `(stops, persons, trials)` to means over trials `(persons, stops)`.
+
+    Nan where no trial.
+    """
     return nan_mean(values, axis=-1).T
 
 
 def nan_mean(values: Floats, axis: int) -> Floats:
-    """Mean of what is there; nan, in silence, where nothing is."""
+    """Return the mean of what is there; nan, in silence, where nothing is."""
     there = np.isfinite(values)
     count = there.sum(axis=axis)
     total = np.where(there, values, 0.0).sum(axis=axis)
@@ -179,12 +188,12 @@ def nan_mean(values: Floats, axis: int) -> Floats:
 
 
 def present(values: Floats) -> Floats:
-    """The finite values, flat."""
+    """Return the finite values, flat."""
     return values[np.isfinite(values)]
 
 
 def as_floats(values: NDArray[Any]) -> Floats:
-    """Any column as floats: true is 1, nothing is nan, words are nan."""
+    """Return any column as floats: true is 1, nothing is nan, words are nan."""
     if values.dtype.kind in "biuf":
         return values.astype(float)
     numbers = int | float | np.number | np.bool_
@@ -209,6 +218,6 @@ def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:
 
 
 def plain_level(value: Any) -> Level:
-    """A level as it was declared: numpy's numbers as Python's."""
+    """Return a level as it was declared: numpy's numbers as Python's."""
     plain: Level = value.item() if isinstance(value, np.generic) else value
     return plain

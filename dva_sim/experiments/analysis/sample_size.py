@@ -63,11 +63,11 @@ class IntervalLaw:
     stretch: float = 1.0
 
     def reach(self, persons: int) -> float:
-        """Distance from the mean to the end of the interval."""
+        """Return the distance from the mean to the end of the interval."""
         return self._critical(persons) * self.spread / math.sqrt(persons)
 
     def power(self, effect: float, persons: int) -> float:
-        """The chance that the interval of so many lies beyond zero if the true mean is `effect`.
+        """Return the chance that the interval of so many lies beyond zero if the mean is `effect`.
 
         Beyond zero means on the side of the effect; the other side does not count.
 
@@ -89,7 +89,7 @@ class IntervalLaw:
 def law_of(
     values: ArrayLike, person: ArrayLike, reach: float | None = None, level: float = LEVEL
 ) -> IntervalLaw | None:
-    """The law that a study's own interval follows; None where its persons are all alike.
+    """Return the law that a study's own interval follows; None where its persons are all alike.
 
     Args:
         values: One value per run `(n,)`, nan where missing: of a comparison, the difference of
@@ -235,7 +235,7 @@ def _to_settle(
 
 
 def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
-    """True differences that one may count on: that found, if it matters, and the smallest."""
+    """Yield true differences that one may count on: that found, if it matters, and the smallest."""
     if found > (smallest or 0.0):
         yield found, "the largest found"
     if smallest is not None:
@@ -298,7 +298,7 @@ def _of_comparisons(
 
 
 def _interval(pairs: PairedRuns, level: float) -> Interval:
-    """Interval of the mean difference at a given level."""
+    """Return the interval of the mean difference at a given level."""
     return mean_interval(pairs.first - pairs.second, pairs.person, level)
 
 
@@ -329,7 +329,7 @@ def _count(chance: Callable[[int], float], wanted: float, known: int, least: int
 
 
 def _fewest(chance: Callable[[int], float], wanted: float) -> float:
-    """By doubling, then by halves; infinite beyond `MOST_PERSONS`."""
+    """Return the fewest, by doubling, then by halves; infinite beyond `MOST_PERSONS`."""
     low = 1
     high = 2
     while chance(high) < wanted:
@@ -357,7 +357,7 @@ def _sides_of(view: StudyView, stop: int) -> str:
 
 
 def _difference_text(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
-    """`A minus B in driving time, at delay 1 s`."""
+    """Return `A minus B in driving time, at delay 1 s`."""
     first, second = (level_name(factor, level) for level in levels)
     where = f", {setting(at)}" if at else ""
     return f"{first} minus {second} in {measure}{where}"

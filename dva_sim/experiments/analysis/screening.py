@@ -59,7 +59,7 @@ class Screening:
 
 
 def judged(study: Study, results: Results) -> Screening:
-    """The effects of all assumed numbers, from the runs of every point."""
+    """Return the effects of all assumed numbers, from the runs of every point."""
     _, answer = rule_of(study)
     walks = walks_of(study)
     numbers = screened(study)

@@ -26,7 +26,7 @@ CALIBRATED = "nearest_idle"
 
 
 def is_dispatch(view: StudyView | None) -> bool:
-    """True if a study compares policies on timed shifts, one line each."""
+    """Return True if a study compares policies on timed shifts, one line each."""
     if view is None or view.line is None or view.line.name != POLICY:
         return False
     return view.part.has("response_mean_s") and view.part.has("bound_mean_s")
@@ -61,7 +61,7 @@ class Shifts:
         return float(np.nanmax(found)) if np.isfinite(found).any() else FOLLOW_S
 
     def of(self, column: str) -> Floats:
-        """Values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
+        """Return values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
         grid = self.view.part.grid(column)
         panel = self.view.panels[0]
         curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.lines]
@@ -72,7 +72,7 @@ class Shifts:
         return nan_mean(self.of(column), axis=0)
 
     def against(self, column: str, baseline: str) -> Band:
-        """Each policy minus the baseline, paired by shift; entries `(policies * stops,)`.
+        """Return each policy minus the baseline, paired by shift; entries `(policies * stops,)`.
 
         The band holds for all policies and loads at once.
         """
@@ -146,7 +146,9 @@ RESAMPLES = 1000
 def pooled(
     events: Mapping[str, NDArray[Any]], quantiles: Sequence[float], follow: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Percentiles with their bootstrap interval over shifts: value, low, high, each `(q,)` [s].
+    """Return percentiles with their bootstrap interval over shifts.
+
+    Value, low, high, each `(q,)` [s].
 
     Infinite where the percentile is not reached by `follow`: for all of a cohort that is
     followed so long this is what the cumulative incidence of response crosses.
@@ -175,7 +177,7 @@ def pooled(
 
 
 def _crossed(ranked: Floats, weights: Floats, wanted: Floats) -> Floats:
-    """The first value by which a share of the weight `(b, n)` is reached, `(b, q)`."""
+    """Return the first value by which a share of the weight `(b, n)` is reached, `(b, q)`."""
     upto = np.cumsum(weights, axis=1)
     places = [(upto >= q * upto[:, -1:] - 1e-9).argmax(axis=1) for q in wanted]
     return np.stack([ranked[place] for place in places], axis=1)

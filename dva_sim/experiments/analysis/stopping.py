@@ -18,7 +18,9 @@ from dva_sim.statistics import band, mean_interval
 
 
 def widest(study: Study, stop: StopRule, runs: Table) -> float:
-    """Half of the widest interval that the rule looks at; infinite where there is none yet.
+    """Return the half of the widest interval that the rule looks at.
+
+    Infinite where there is none yet.
 
     Args:
         runs: The table of runs so far.
@@ -28,7 +30,7 @@ def widest(study: Study, stop: StopRule, runs: Table) -> float:
 
 
 def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
-    """Half of each interval that the rule looks at; nan where there is none yet."""
+    """Return the half of each interval that the rule looks at; nan where there is none yet."""
     if not runs:
         return np.array([])
     if stop.comparison is None:
@@ -40,7 +42,7 @@ def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
 
 
 def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Floats:
-    """Half-widths of the paired difference at each level of `over`; references cancel.
+    """Return half-widths of the paired difference at each level of `over`; references cancel.
 
     The answer's is adjusted for the covariates. Factors that it does not name are at their first
     level, but for those of rows, which are averaged.
@@ -57,7 +59,7 @@ def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Fl
     over = axes.index(asked.over) if asked.over is not None else None
 
     def sides(grid: Floats) -> list[Floats]:
-        """First and second, `(stops, persons, trials)` each."""
+        """Return the first and second, `(stops, persons, trials)` each."""
         found = []
         for side in asked.contrast:
             values = part.where(grid, fixed | {asked.factor: side})

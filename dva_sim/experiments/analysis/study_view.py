@@ -101,19 +101,22 @@ class StudyView:
         return self.possible[1] - self.possible[0]
 
     def setting(self, panel: Setting, line: Level) -> Setting:
-        """The levels that a line of a panel stands for."""
+        """Return the levels that a line of a panel stands for."""
         return dict(panel) | ({self.line.name: line} if self.line else {})
 
     def along_x(self) -> dict[str, Any]:
-        """The levels along x under their factor's name; nothing where there is no such factor."""
+        """Return the levels along x under their factor's name.
+
+        Nothing where there is no such factor.
+        """
         return {self.over.name: self.over.levels} if self.over else {}
 
     def at_stop(self, stop: int) -> Setting:
-        """The level along x of one stop."""
+        """Return the level along x of one stop."""
         return {self.over.name: self.over.levels[stop]} if self.over else {}
 
     def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
-        """Values along x as `(stops, persons, trials)`."""
+        """Return values along x as `(stops, persons, trials)`."""
         values = self.part.where(grid, self.setting(panel, line))
         return values if self.over else values[np.newaxis]
 
@@ -132,7 +135,7 @@ class StudyView:
         return [int(stop) for stop in np.flatnonzero(np.array(marks).any(axis=0))]
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
-        """First minus second, paired by person and trial, as person means `(persons, stops)`.
+        """Return first minus second, paired by person and trial: person means `(persons, stops)`.
 
         Where there are covariates, as values of the persons whose mean is the adjusted one.
         """
@@ -144,12 +147,12 @@ class StudyView:
         return adjusted_means(sides(self.values), beside)
 
     def band_of(self, panel: Setting, first: Level, second: Level) -> Band:
-        """Differences at all stops with their band; see `difference`."""
+        """Return differences at all stops with their band; see `difference`."""
         return band(self.difference(panel, first, second), self.level)
 
 
 def adjusted_means(sides: Sequence[Floats], covariates: Sequence[Sequence[Floats]]) -> Floats:
-    """First minus second, paired by person and trial, as person means `(persons, stops)`.
+    """Return first minus second, paired by person and trial: person means `(persons, stops)`.
 
     Where there are covariates, as values of the persons whose mean is the adjusted one.
 
@@ -165,12 +168,12 @@ def adjusted_means(sides: Sequence[Floats], covariates: Sequence[Sequence[Floats
 
 
 def product_of(part: RunGrid, covariate: str) -> Floats:
-    """A covariate's grid: the product of its columns."""
+    """Return a covariate's grid: the product of its columns."""
     return np.asarray(np.prod([part.grid(name) for name in multiplied(covariate)], axis=0))
 
 
 def covariates_of(study: Mapping[str, Any], part: RunGrid) -> tuple[list[str], list[str]]:
-    """The covariates for which the answer is adjusted, and those whose mean cannot be zero.
+    """Return the covariates for which the answer is adjusted, and those whose mean cannot be zero.
 
     Nobody can prove of a column that its mean over all persons and trials is zero. One that is
     more than five standard errors off, which happens to one in a million, is not.
@@ -181,20 +184,20 @@ def covariates_of(study: Mapping[str, Any], part: RunGrid) -> tuple[list[str], l
 
 
 def _of_persons(part: RunGrid, covariate: str) -> Floats:
-    """The mean over all runs of each person."""
+    """Return the mean over all runs of each person."""
     by_person = np.moveaxis(product_of(part, covariate), -2, 0)
     return person_means(by_person.reshape(1, len(by_person), -1))[:, 0]
 
 
 def factors_of(study: Mapping[str, Any]) -> list[Factor]:
-    """The declared factors, in order."""
+    """Return the declared factors, in order."""
     return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
 
 
 def part_of(
     study: Mapping[str, Any], runs: Table, name: str, *, are_points_trials: bool = True
 ) -> RunGrid:
-    """The runs of a part, laid out by the factors that tell its cells apart.
+    """Return the runs of a part, laid out by the factors that tell its cells apart.
 
     In the full grid these are the factors declared. Factors whose levels are taken together are
     one, that of which the answer speaks or the first. Points in ranges are like trials: a person
@@ -224,13 +227,13 @@ def part_of(
 
 
 def parts_of(study: Mapping[str, Any], runs: Table) -> list[RunGrid]:
-    """Every part that has runs, with each point as a level of its own."""
+    """Return every part that has runs, with each point as a level of its own."""
     names = dict.fromkeys(map(str, runs["part"]))
     return [part_of(study, runs, name, are_points_trials=False) for name in names]
 
 
 def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
-    """Continuous factors: columns of numbers that tell where in its ranges each run lies."""
+    """Return continuous factors: columns of numbers that tell where in its ranges each run lies."""
     if POINT not in study.get("factors", {}) or POINT not in runs:
         return []
     design = list(runs)[: list(runs).index("is_reference")]
@@ -239,7 +242,7 @@ def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
 
 
 def _as_trials(runs: Table) -> Table:
-    """Each point and trial as a trial of its own; a reference run is that of every point."""
+    """Return each point and trial as a trial of its own; a reference run is that of every point."""
     aside = np.asarray(runs["is_reference"]).astype(bool)
     points = np.unique(as_floats(runs[POINT])[~aside]).astype(int)
     own = np.flatnonzero(~aside)
@@ -252,14 +255,17 @@ def _as_trials(runs: Table) -> Table:
 
 
 def _is_sparse(runs: Table, factors: Sequence[Factor]) -> bool:
-    """True if fewer than half of the grid's cells were run."""
+    """Return True if fewer than half of the grid's cells were run."""
     treated = ~np.asarray(runs["is_reference"]).astype(bool)
     ran = len(np.unique(np.asarray(runs["cell"])[treated])) if "cell" in runs else 0
     return 2 * ran < math.prod(len(f.levels) for f in factors)
 
 
 def row_names(study: Mapping[str, Any], runs: Table) -> dict[int, str]:
-    """Names of the cells of a listed design, by their settings; empty for factorial designs."""
+    """Return names of the cells of a listed design, by their settings.
+
+    Empty for factorial designs.
+    """
     factors = factors_of(study)
     listed = bool(study.get("design")) and not study.get("answer") and "cell" in runs
     if not listed or POINT in study["factors"] or not _is_sparse(runs, factors):
@@ -273,13 +279,13 @@ def row_names(study: Mapping[str, Any], runs: Table) -> dict[int, str]:
 
 
 def with_rows(table: Table, names: Mapping[int, str]) -> Table:
-    """A table with a column that says which row of the list each of its rows belongs to."""
+    """Return a table with a column that says which row of the list each of its rows belongs to."""
     column = np.array([names.get(int(cell), "") for cell in table["cell"]], dtype=object)
     return dict(table) | {ROW: column}
 
 
 def keys_of(study: Mapping[str, Any]) -> list[Factor]:
-    """The scenario keys that vary, with their levels: treatments by what they change.
+    """Return the scenario keys that vary, with their levels: treatments by what they change.
 
     For a range these are its ends.
     """
@@ -305,7 +311,9 @@ def keys_of(study: Mapping[str, Any]) -> list[Factor]:
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
-    """The view that the declared answer asks for; without one, that of the only contrast possible.
+    """Return the view that the declared answer asks for.
+
+    Without one, that of the only contrast possible.
 
     Returns None where there is no run to look at.
     """
@@ -357,7 +365,7 @@ def _only_answer(part: RunGrid) -> dict[str, Any]:
 
 
 def finding_of(view: StudyView) -> Finding | None:
-    """The declared contrast, measured; None where no contrast was declared or run."""
+    """Return the declared contrast, measured; None where no contrast was declared or run."""
     if view.contrast is None or view.line is None:
         return None
     panel = view.panels[0]
@@ -388,21 +396,21 @@ def finding_of(view: StudyView) -> Finding | None:
 
 
 def _usual(view: StudyView, level: Level) -> Floats:
-    """The median of all runs under a level `(stops,)`; nan where there is none."""
+    """Return the median of all runs under a level `(stops,)`; nan where there is none."""
     values = view.curve(view.part.grid(view.measure), view.panels[0], level)
     seen = [present(runs) for runs in values]
     return np.array([float(np.median(runs)) if len(runs) else math.nan for runs in seen])
 
 
 def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
-    """The least and the greatest value that a measure can take in a run of a scenario."""
+    """Return the least and the greatest value that a measure can take in a run of a scenario."""
     column = measure_called(measure, scenario.get("model", "full"))
     low, high = column.bounds
     return low, min(high, float(scenario.get("horizon_s", math.inf))) if column.awaits else high
 
 
 def interval_of(values: Floats, level: float = LEVEL) -> Interval | None:
-    """Mean of `(persons, trials)` over persons, with its bootstrap interval over persons.
+    """Return the mean of `(persons, trials)` over persons, with its bootstrap interval.
 
     The interval of persons who are all alike is that one value. None where nobody has a value.
     """
@@ -416,7 +424,7 @@ def interval_of(values: Floats, level: float = LEVEL) -> Interval | None:
 
 
 def _missed(view: StudyView) -> tuple[Missed, ...]:
-    """Runs without confirmation at the last stop, for every line."""
+    """Return runs without confirmation at the last stop, for every line."""
     if not view.part.has("confirmed"):
         return ()
     grid = view.part.grid("confirmed")
@@ -426,7 +434,7 @@ def _missed(view: StudyView) -> tuple[Missed, ...]:
 
 
 def _horizon(view: StudyView) -> float | None:
-    """Value that missed runs count with, if all have the same [s]."""
+    """Return the value that missed runs count with, if all have the same [s]."""
     if not view.part.has("confirmed") or unit_of(view.measure) != "s":
         return None
     missed = as_floats(view.part.treated["confirmed"]) == 0

@@ -179,28 +179,28 @@ class Checkpoint:
             self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
 
     def manifest(self) -> dict[str, Any] | None:
-        """Manifest stored by `describe`; None if there is none."""
+        """Return the manifest stored by `describe`; None if there is none."""
         if "manifest" not in {row[1] for row in self._ask("PRAGMA table_info(study)")}:
             return None
         ((text,),) = self._ask("SELECT manifest FROM study")
         return None if text is None else dict(json.loads(text))
 
     def done(self) -> set[RunKey]:
-        """Keys of the runs that need not be run again."""
+        """Return keys of the runs that need not be run again."""
         return set(self._ask("SELECT config, seed FROM runs WHERE tables IS NOT NULL"))
 
     def failures(self) -> dict[RunKey, str]:
-        """Runs that failed and have not succeeded since, with the reason."""
+        """Return runs that failed and have not succeeded since, with the reason."""
         query = "SELECT config, seed, error FROM runs WHERE tables IS NULL"
         return {(config, seed): error for config, seed, error in self._ask(query)}
 
     def tables(self, key: RunKey) -> Tables | None:
-        """The tables of a run; None if it is not done."""
+        """Return the tables of a run; None if it is not done."""
         query = "SELECT tables FROM runs WHERE config = ? AND seed = ?"
         return next((json.loads(text) for (text,) in self._ask(query, key) if text), None)
 
     def costs(self) -> dict[RunKey, float]:
-        """Cost of each completed run [CPU s]."""
+        """Return the cost of each completed run [CPU s]."""
         query = "SELECT config, seed, cost_s FROM runs WHERE tables IS NOT NULL"
         return {(config, seed): cost for config, seed, cost in self._ask(query)}
 
@@ -296,7 +296,7 @@ def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
 def _aside(
     folder: Path, manifest: dict[str, Any], runs: Sequence[StudyRun], tables_of: TablesOf
 ) -> Results:
-    """Results whose tables are kept for as long as somebody reads them."""
+    """Return results whose tables are kept for as long as somebody reads them."""
     aside = _tables_aside(runs, tables_of)
     manifest["tables"] = digests(aside / TABLES)
     results = Results(folder, manifest, aside)
@@ -305,7 +305,7 @@ def _aside(
 
 
 def _tables_aside(runs: Sequence[StudyRun], tables_of: TablesOf) -> Path:
-    """Tables of some runs, in a folder of their own that does not disturb who still runs."""
+    """Return tables of some runs, in a folder of their own that does not disturb who still runs."""
     try:
         aside = Path(tempfile.mkdtemp(prefix="dva-sim-"))
     except OSError as error:

@@ -89,7 +89,10 @@ class DaskCluster(Workers):
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
-        """The whole cluster, whatever the width; what it has not done is called off at the end."""
+        """Yield the whole cluster, whatever the width.
+
+        What it has not done is called off at the end.
+        """
         executor = self._client.get_executor(pure=False)
         try:
             yield executor
@@ -108,7 +111,7 @@ class DaskCluster(Workers):
             executor.shutdown(wait=False)
 
     def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
-        """The task, refused by workers of another program."""
+        """Return the task, refused by workers of another program."""
         return partial(_checked, task, versions())
 
     def look_after(self, is_idle: bool) -> None:
@@ -136,7 +139,7 @@ class DaskCluster(Workers):
         )
 
     def _workers(self) -> dict[str, Any] | None:
-        """Those there are; None if the scheduler does not say."""
+        """Return those there are; None if the scheduler does not say."""
         if not self._is_connected():
             return None
         ask = self._client.scheduler.identity
@@ -148,7 +151,7 @@ class DaskCluster(Workers):
             return None
 
     def _is_connected(self) -> bool:
-        """True if connected or reconnecting."""
+        """Return True if connected or reconnecting."""
         return self._client.status in ("running", "connecting")
 
 
@@ -215,7 +218,7 @@ def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.
 
 
 def differences(wanted: Versions, found: Versions) -> str:
-    """In what two programs differ; empty if their runs give the same."""
+    """Return in what two programs differ; empty if their runs give the same."""
     names = [name for name in {**wanted, **found} if name not in _STATE]
     odd = [name for name in names if wanted.get(name) != found.get(name)]
     return ", ".join(f"{name} {found.get(name)} (here {wanted.get(name)})" for name in odd)

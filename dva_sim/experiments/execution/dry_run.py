@@ -180,7 +180,7 @@ def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
 
 
 def _spread(count: int) -> list[int]:
-    """All indices, so ordered that any beginning is spread over the whole range."""
+    """Return all indices, so ordered that any beginning is spread over the whole range."""
     step = next(
         s for s in range(max(1, round(count * 0.618)), count + 2) if math.gcd(s, count) == 1
     )

@@ -124,7 +124,7 @@ class Workers(ABC):
 
     @abstractmethod
     def executor(self, width: int, task: Callable[..., Any]) -> AbstractContextManager[Executor]:
-        """Workers that are gone, or have nothing more to do, when the block ends.
+        """Return workers that are gone, or have nothing more to do, when the block ends.
 
         Args:
             width: Number of workers.
@@ -132,11 +132,11 @@ class Workers(ABC):
         """
 
     def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
-        """The task as it should be handed out."""
+        """Return the task as it should be handed out."""
         return task
 
     def look_after(self, is_idle: bool) -> None:  # noqa: B027
-        """Called now and then; nothing has to be done.
+        """Look after the workers, now and then; nothing has to be done.
 
         Args:
             is_idle: True if no result has come for some seconds.
@@ -147,7 +147,7 @@ class Workers(ABC):
 
 
 def local(processes: int | None) -> Workers:
-    """Processes of this machine; with one, everything happens in this process.
+    """Return processes of this machine; with one, everything happens in this process.
 
     Raises:
         ConfigError: less than one.
@@ -159,7 +159,7 @@ def local(processes: int | None) -> Workers:
 
 
 def cores() -> int:
-    """Number of CPU cores available to this process."""
+    """Return the number of CPU cores available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -173,7 +173,7 @@ class ThisProcess(Workers):
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
-        """One that has done what it is given when `submit` returns."""
+        """Yield one that has done what it is given when `submit` returns."""
         yield _AtOnce()
 
 
@@ -199,7 +199,7 @@ class LocalProcesses(Workers):
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
-        """Threads that each wait for a process; an error in the block ends these at once.
+        """Yield threads that each wait for a process; an error in the block ends these at once.
 
         Raises:
             ConfigError: the task is defined in the script that was started.
@@ -290,7 +290,7 @@ class _Handing(ThreadPoolExecutor):
 
 @contextmanager
 def _ctrl_c_held_back(at_once: Callable[[], object]) -> Iterator[Callable[[], None]]:
-    """Ctrl-C does something at once, and is raised where the block lets it through, or at its end.
+    """Hold Ctrl-C back until the block lets it through, or ends.
 
     Raised anywhere, it may leave a lock of the pool locked for ever: the pool's own thread would
     wait for that, and this one for the pool's.

@@ -98,7 +98,7 @@ def record_study(
 
 
 def chosen(plan: StudyPlan, rows: Mapping[Address, Row]) -> list[StudyJob]:
-    """The runs to record, in the order of the design.
+    """Return the runs to record, in the order of the design.
 
     Args:
         plan: Plan of a study that records all runs, the worst of each cell, or a sample of each.
@@ -138,7 +138,7 @@ def badness(measure: str, row: Row) -> float:
 
 
 def _tidied(folder: Path, wanted: Iterable[str]) -> Path:
-    """The folder without what an earlier choice or a killed process has left."""
+    """Return the folder without what an earlier choice or a killed process has left."""
     try:
         folder.mkdir(exist_ok=True)
         names = set(wanted)

@@ -166,7 +166,7 @@ class KeptRun:
             raise
 
     def _restore(self) -> None:
-        """The folder was removed: make it again, with all of the journal, which is still open."""
+        """Make a removed folder again, with all of the journal, which is still open."""
         self._folder.mkdir(parents=True, exist_ok=True)
         copy = _connected(self._folder)
         try:

@@ -37,7 +37,7 @@ class SampledRun(NamedTuple):
 
 
 def sampled_jobs(study: Study) -> Iterator[StudyJob]:
-    """The few runs, part by part.
+    """Yield the few runs, part by part.
 
     There are none of a study whose runs are measured in real time.
     """
@@ -51,7 +51,7 @@ def sampled_jobs(study: Study) -> Iterator[StudyJob]:
 
 
 def _covering(cells: Sequence[set[tuple[str, Any]]]) -> list[int]:
-    """The first cell and, one by one, those with the most levels that none before has."""
+    """Return the first cell and, one by one, those with the most levels that none before has."""
     chosen = [0]
     left = set().union(*cells) - cells[0]
     while left:
@@ -70,7 +70,7 @@ def run_sampled(job: StudyJob) -> SampledRun:
 def sampled_runs(
     studies: Mapping[str, Study], processes: int
 ) -> Iterator[tuple[str, list[SampledRun]]]:
-    """The few runs of some studies by their names, in the order given, as they come.
+    """Yield the few runs of some studies by their names, in the order given, as they come.
 
     Args:
         studies: The studies.
@@ -85,5 +85,5 @@ def sampled_runs(
 
 
 def digests_of(runs: Sequence[SampledRun]) -> Digests:
-    """The digest of each run, by `CONFIG/SEED`."""
+    """Return the digest of each run, by `CONFIG/SEED`."""
     return {f"{run.job.config}/{run.job.seed}": run.digest for run in runs}

@@ -87,7 +87,7 @@ def perform(
 
 
 def clock_of(job: StudyJob) -> Callable[[], float]:
-    """Clock for the cost of a run [s]: CPU time, or wall clock in real time."""
+    """Return the clock for the cost of a run [s]: CPU time, or wall clock in real time."""
     is_real_time = job.scenario is not None and model_for(job.scenario).is_real_time
     return time.monotonic if is_real_time else time.thread_time
 
@@ -100,7 +100,7 @@ def perform_chunk(
 
 
 def _checked(tables: Tables, job: StudyJob) -> Tables:
-    """The tables, if they can be kept beside the columns of the design."""
+    """Return the tables, if they can be kept beside the columns of the design."""
     taken = {*DESIGN_COLUMNS, *job.levels}
     for name, rows in tables.items():
         if not (name.isascii() and name.isidentifier()):
@@ -114,7 +114,7 @@ def _checked(tables: Tables, job: StudyJob) -> Tables:
 
 
 def _scalar(value: Any) -> Any:
-    """A numpy number as Python's own."""
+    """Return a numpy number as Python's own."""
     if getattr(value, "shape", None) == ():
         return value.item()
     raise TypeError(f"{type(value).__name__} {value!r} cannot be kept in a table")
@@ -137,7 +137,7 @@ class _Pace:
         self._cost_s += sum(outcome.cost_s for outcome in outcomes)
 
     def chunk(self, waiting: deque[StudyJob], workers: Workers) -> list[StudyJob]:
-        """The next jobs: fewer towards the end, so that the workers finish together."""
+        """Return the next jobs: fewer towards the end, so that the workers finish together."""
         if workers.is_here or not self._runs:
             return [waiting.popleft()]
         rate = self._runs / max(self._cost_s, 1e-9)
@@ -242,7 +242,7 @@ def limited(seconds: float, may_exit: bool) -> Iterator[None]:
 
 @contextmanager
 def _by_signal(seconds: float) -> Iterator[None]:
-    """Signals at each of several ticks, since a process that is stopped misses all but one."""
+    """Send signals at each of several ticks, since a stopped process misses all but one."""
     ticks = math.ceil(seconds)
     left = ticks
 

@@ -215,7 +215,7 @@ def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterat
 
 
 def _opened(out: Path, identity: str) -> Checkpoint:
-    """The journal of a results folder, which must be this study's or new."""
+    """Return the journal of a results folder, which must be this study's or new."""
     try:
         if not (out / JOURNAL).exists() and (out / MANIFEST).exists():
             found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
@@ -229,7 +229,7 @@ def _opened(out: Path, identity: str) -> Checkpoint:
 
 
 def _is_written(out: Path, manifest: dict[str, Any]) -> bool:
-    """True if this very program wrote the tables of these runs, and they are unchanged.
+    """Return True if this very program wrote the tables of these runs, and they are unchanged.
 
     The tables of a run never change once kept. So the same runs, with the same failures,
     make the same tables; only a program that is being changed may write them in another way.
@@ -292,7 +292,7 @@ class FileWatch:
             )
 
     def _look(self) -> dict[str, Version]:
-        """The version of each file by name."""
+        """Return the version of each file by name."""
         folders = list(self._folders())
         seen = tuple(map(version_of, folders))
         files = dict(self._files())

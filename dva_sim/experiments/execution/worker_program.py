@@ -26,7 +26,7 @@ def serve(number: int) -> None:
 
 
 def _end_with_parent(number: int) -> None:
-    """Whatever is being done: nobody waits for it any more."""
+    """End whatever is being done with the parent: nobody waits for it any more."""
     hang_up = select.poll()
     hang_up.register(number, 0)
     hang_up.poll()

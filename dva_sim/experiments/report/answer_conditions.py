@@ -36,7 +36,7 @@ _MOST_KEYS = 5
 
 
 def depends(reading: ResultsReading) -> dict[str, str]:
-    """By what each sentence is about; only what can be told of this study."""
+    """Return what each sentence depends on; only what can be told of this study."""
     view = reading.view
     finding = reading.finding
     if view is None or finding is None:
@@ -85,7 +85,7 @@ def _waiting(view: StudyView, finding: Finding) -> Iterator[str]:
 
 
 def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
-    """The answer under the other settings that were run, and what was not varied at all."""
+    """Return the answer under the other settings that were run, and what was not varied at all."""
     stop = telling_stop(finding)
     others = view.panels[1:] if finding.within and stop is not None else []
     differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in others]
@@ -122,7 +122,7 @@ def _difference(
 
 
 def _apart(panel: Setting, usual: Setting) -> str:
-    """The levels of a panel that are not those of the answer."""
+    """Return the levels of a panel that are not those of the answer."""
     other = {name: level for name, level in panel.items() if level != usual.get(name)}
     return brief(other) if TUNING in other else setting(other)
 
@@ -193,7 +193,7 @@ def assumed_times(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> str
 
 
 def _of_team(group: Mapping[str, Any], contains: bool) -> str:
-    """`guard 45 s to set out, 3 s to look (typical times)`; empty where all take no time."""
+    """Return `guard 45 s to set out, 3 s to look (typical times)`; empty where all take no time."""
     times = {name: _typical(group.get(name) or {}) for name in _TIMES}
     if group.get("kind") == "robot" or not contains:
         del times["act"]
@@ -202,13 +202,13 @@ def _of_team(group: Mapping[str, Any], contains: bool) -> str:
 
 
 def _typical(law: Mapping[str, Any]) -> float:
-    """The median of a law if it has one, else its mean, else its middle [s]."""
+    """Return the median of a law if it has one, else its mean, else its middle [s]."""
     known = [law[key] for key in ("median_s", "mean_s") if law.get(key)]
     return float(known[0] if known else (law.get("low_s", 0) + law.get("high_s", 0)) / 2)
 
 
 def _hidden(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> list[Unnoticed]:
-    """Nothing where the scenario or its site is not as it was."""
+    """Return hidden effects; nothing where the scenario or its site is not as it was."""
     streams = [{k: v for k, v in stream.items() if v != ""} for stream in scenario["demand"]]
     try:
         known = TimedScenario.model_validate(dict(scenario) | {"demand": streams})

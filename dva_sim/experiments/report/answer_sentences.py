@@ -143,7 +143,7 @@ def _dependence(f: Finding, is_led: bool) -> str:
 
 
 def _without_band(f: Finding) -> str:
-    """Without a band: the plain mean of these runs, and no claim beyond them."""
+    """Return the plain mean of these runs, without a band and without a claim beyond them."""
     there = np.flatnonzero(np.isfinite(f.mean))
     if not len(there):
         return sentence("no_pair")
@@ -152,7 +152,7 @@ def _without_band(f: Finding) -> str:
 
 
 def _facts(f: Finding, stop: int) -> dict[str, object]:
-    """Names of measure, sides and levels, and the difference at a stop."""
+    """Return names of measure, sides and levels, and the difference at a stop."""
     return {
         "f": f,
         "measure": measure_name(f.measure),
@@ -174,12 +174,12 @@ def _word(f: Finding, difference: float) -> str:
 
 
 def _side(f: Finding, level: str | float | bool | None) -> str:
-    """The name of a level; with its factor's where it is no word of its own."""
+    """Return the name of a level; with its factor's where it is no word of its own."""
     return level_name(f.factor, level) if isinstance(level, str) else named(f.factor, level)
 
 
 def _size(f: Finding, stop: int) -> str:
-    """`+4.5 s (95 % band 3.0 to 6.0 s, extrapolated)`; without a band the mean alone."""
+    """Return `+4.5 s (95 % band 3.0 to 6.0 s, extrapolated)`; without a band the mean alone."""
     mean = signed(float(f.mean[stop]), f.unit)
     if not np.isfinite(f.low[stop]):
         return mean
@@ -188,12 +188,14 @@ def _size(f: Finding, stop: int) -> str:
 
 
 def _interval(f: Finding) -> str:
-    """A band covers several levels at once."""
+    """Return a band covers several levels at once."""
     return "band" if len(f.levels) > 1 else "interval"
 
 
 def _limits(f: Finding, others: OtherRuns, stop: int | None = None) -> str:
-    """`+3.8 to +14.9 s (95 % limits; means +5.1 to +14.4 s)`: the widest range that is meant.
+    """Return `+3.8 to +14.9 s (95 % limits.
+
+    Means +5.1 to +14.4 s)`: the widest range that is meant.
 
     Args:
         f: The finding.
@@ -213,18 +215,21 @@ def _range(low: float, high: float, unit: str) -> str:
 
 
 def other_levels(f: Finding, count: int) -> str:
-    """`3 other levels of phone`: the levels beside the answer's, by their factors' names."""
+    """Return `3 other levels of phone`: the levels beside the answer's, by their factors' names."""
     return f"{f'{count} ' if count > 1 else ''}other {_levels_of(f, count)}"
 
 
 def _levels_of(f: Finding, count: int = 2) -> str:
-    """`levels of phone`, or `combinations of phone and control`."""
+    """Return `levels of phone`, or `combinations of phone and control`."""
     one = "combination" if len(f.within) > 1 else "level"
     return f"{one}{'s' * (count > 1)} of {listing([factor_name(name) for name in f.within])}"
 
 
 def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
-    """The last level of a quantity, for that is the question; else the largest difference."""
+    """Return the last level of a quantity, for that is the question.
+
+    Else the largest difference.
+    """
     return int(where[-1] if _is_ordered(f) else where[np.argmax(abs(f.mean[where]))])
 
 
@@ -237,7 +242,7 @@ def telling_stop(finding: Finding) -> int | None:
 
 
 def place(f: Finding, where: Sequence[int] | NDArray[np.intp]) -> str:
-    """`at one-way delay 1 s`, `from 250 ms on`, or else; empty without an axis."""
+    """Return `at one-way delay 1 s`, `from 250 ms on`, or else; empty without an axis."""
     if not f.over:
         return f.everywhere
     levels = [f.levels[int(stop)] for stop in where]
@@ -254,6 +259,6 @@ def place(f: Finding, where: Sequence[int] | NDArray[np.intp]) -> str:
 
 
 def _is_ordered(f: Finding) -> bool:
-    """True if the levels are ascending quantities."""
+    """Return True if the levels are ascending quantities."""
     values = [v for v in f.levels if isinstance(v, int | float)]
     return len(values) == len(f.levels) and values == sorted(values)

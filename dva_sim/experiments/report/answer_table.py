@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def answer_table(reading: Reading) -> CellTable | None:
-    """A row for each level that the answer runs over; None where it has no contrast."""
+    """Return a row for each level that the answer runs over; None where it has no contrast."""
     view = reading.view
     finding = reading.worded_finding
     if view is None or finding is None or not finding.over:
@@ -59,7 +59,7 @@ def _why_no_sum(view: StudyView, plain: Floats, rows: Sequence[Sequence[str]]) -
 
 
 def _means(view: StudyView, level: object) -> Floats:
-    """Over persons, at each stop."""
+    """Return means over persons, at each stop."""
     curve = view.curve(view.values, view.panels[0], level)  # type: ignore[arg-type]
     return nan_mean(person_means(curve), axis=0)
 
@@ -92,6 +92,6 @@ def spread_table(view: StudyView) -> CellTable | None:
 
 
 def _printed(found: Components) -> list[str]:
-    """Standard deviations in the measure's unit, and the share between persons."""
+    """Return standard deviations in the measure's unit, and the share between persons."""
     deviations: Floats = np.sqrt([found.between, found.within])
     return [*(number(float(x)) for x in deviations), percent(found.share)]

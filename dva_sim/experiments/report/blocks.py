@@ -156,7 +156,7 @@ class Term:
 
 
 def _all() -> Iterator[Term]:
-    """Patterns by either of their names, and what stands in `words.yaml`."""
+    """Yield patterns by either of their names, and what stands in `words.yaml`."""
     for kind in PATTERNS.values():
         yield Term(
             kind.title, meaning_of(kind), f"\\b(?:{re.escape(kind.title)}|{re.escape(kind.label)})"

@@ -41,7 +41,7 @@ class CellTable:
 
 
 def _hundredths(share: float) -> str:
-    """A share in percent, whose sign stands in the head."""
+    """Return a share in percent, whose sign stands in the head."""
     return percent(share).removesuffix("\N{NO-BREAK SPACE}%")
 
 
@@ -71,7 +71,9 @@ def cell_table(
     is_listed: bool = False,
     points: Sequence[str] = (),
 ) -> CellTable:
-    """Every cell of a part: size, confirmed share, the measure with its interval, and the rest.
+    """Return every cell of a part.
+
+    Size, confirmed share, the measure with its interval, and the rest.
 
     Args:
         part: The runs.
@@ -117,7 +119,7 @@ def cell_table(
 
 
 def _constant(table: CellTable) -> list[int]:
-    """Columns of which every row says the same; of a single row, none."""
+    """Return columns of which every row says the same; of a single row, none."""
     columns = range(table.labels, len(table.heads))
     if len(table.rows) < _FEWEST_ROWS:
         return []
@@ -125,7 +127,7 @@ def _constant(table: CellTable) -> list[int]:
 
 
 def _without_constants(table: CellTable) -> CellTable:
-    """Without the columns that do not vary."""
+    """Return the table without the columns that do not vary."""
     kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
     heads = [table.heads[n] for n in kept]
     rows = [[row[n] for n in kept] for row in table.rows]
@@ -138,7 +140,7 @@ _MARK = "\N{NO-BREAK SPACE}†"
 
 
 def _cells(part: RunGrid, column: str) -> list[Floats]:
-    """The finite values of every cell, in the order of `RunGrid.settings`."""
+    """Return the finite values of every cell, in the order of `RunGrid.settings`."""
     return [present(cell) for cell in _by_cell(part, part.grid(column))]
 
 
@@ -147,7 +149,7 @@ def _by_cell(part: RunGrid, grid: Floats) -> Floats:
 
 
 def _value(part: RunGrid, name: str) -> _Column:
-    """Values of a factor outside the grid, one for each cell."""
+    """Return values of a factor outside the grid, one for each cell."""
     values = [plain_level(value) for value in part.first_of_cells(name)]
     return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
 
@@ -184,7 +186,7 @@ def _endings(part: RunGrid) -> Iterator[_Column]:
 
 
 def _measure(part: RunGrid, measure: str, possible: tuple[float, float]) -> list[_Column]:
-    """Median and mean with its 95 % interval, in excess of the reference where there is one.
+    """Return median and mean with its 95 % interval, in excess of the reference if there is one.
 
     An interval ends where no value is possible.
     """
@@ -206,7 +208,7 @@ def _measure(part: RunGrid, measure: str, possible: tuple[float, float]) -> list
 
 
 def _beyond(support: Support | None) -> _Column | None:
-    """The delay that people would have been watched at, marked where nobody was."""
+    """Return the delay that people would have been watched at, marked where nobody was."""
     if support is None:
         return None
     pairs = zip(support.delays.ravel(), support.outside.ravel(), strict=True)
@@ -222,7 +224,7 @@ def _what_is_covered(support: Support | None) -> str:
 
 
 def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:
-    """The runs of a cell as one printed number; a dash where there are none."""
+    """Return the runs of a cell as one printed number; a dash where there are none."""
     return text(float(summary(cell))) if len(cell) else "–"
 
 

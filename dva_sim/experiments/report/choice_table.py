@@ -19,7 +19,7 @@ WORST = "worst of these"
 
 
 def choice_table(found: ChoiceMap, part: str) -> CellTable:
-    """The best choices in each situation, and what each other one costs beyond them.
+    """Return the best choices in each situation, and what each other one costs beyond them.
 
     A row is a situation, or a choice where those are more.
     """
@@ -32,7 +32,7 @@ _Lines = tuple[list[str], int, list[list[str]]]
 
 
 def _by_situation(found: ChoiceMap) -> _Lines:
-    """Heads, how many of them are labels, and a row for each situation."""
+    """Return heads, how many of them are labels, and a row for each situation."""
     choices = found.choice.levels
     heads = [
         factor_name(found.given.name),
@@ -50,7 +50,10 @@ def _by_situation(found: ChoiceMap) -> _Lines:
 
 
 def _by_choice(found: ChoiceMap) -> _Lines:
-    """Heads, how many of them are labels, and a row for each choice; assumptions stand below."""
+    """Return Heads, how many of them are labels, and a row for each choice.
+
+    Assumptions stand below.
+    """
     situations = range(len(found.given.levels))
     names = [situation_name(found, g) for g in situations]
     rows = [
@@ -68,7 +71,10 @@ def _by_choice(found: ChoiceMap) -> _Lines:
 
 
 def beside_table(found: ChoiceMap, part: str) -> CellTable:
-    """A row for each situation and choice: the loss itself, and what else a drive is like."""
+    """Return a row for each situation and choice.
+
+    The loss itself, and what else a drive is like.
+    """
     heads = [
         factor_name(found.given.name),
         factor_name(found.choice.name),
@@ -94,7 +100,7 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
 
 
 def facts_of(found: ChoiceMap) -> dict[str, Any]:
-    """Facts about a map for captions and notes."""
+    """Return facts about a map for captions and notes."""
     return {
         "unit": found.unit or "no unit",
         "models": len(found.models.levels),
@@ -109,13 +115,16 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
 
 
 def _range(values: Floats) -> str:
-    """`39 to 103`, from the least to the greatest."""
+    """Return `39 to 103`, from the least to the greatest."""
     ends = (regret_number(float(edge)) for edge in (values.min(), values.max()))
     return " to ".join(dict.fromkeys(ends))
 
 
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
-    """`3 to 69`, over the models of persons; `=`: as good as any; `0.0 to 9 ?`: not settled."""
+    """Return `3 to 69`, over the models of persons.
+
+    `=`: as good as any; `0.0 to 9 ?`: not settled.
+    """
     if found.never[situation, choice].all():
         return NEVER
     if found.is_best[situation, choice]:
@@ -127,12 +136,12 @@ def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
 
 
 def overall_text(found: ChoiceMap, choice: int) -> str:
-    """The most that a choice costs beyond the best one, in any situation."""
+    """Return the most that a choice costs beyond the best one, in any situation."""
     return regret_number(float(found.overall[choice]))
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:
-    """A situation, marked if it, unlike others, is beyond what people were watched at."""
+    """Return a situation, marked if it, unlike others, is beyond what people were watched at."""
     name = level_name(found.given.name, found.given.levels[situation])
     is_marked = found.outside[situation].any() and not found.is_beyond
     return f"{name} †" if is_marked else name
@@ -168,7 +177,7 @@ def lead_of(found: ChoiceMap) -> str:
 
 
 def _cost(found: ChoiceMap, choice: int) -> str:
-    """`14.6 s`: the most that a choice costs beyond the best one."""
+    """Return `14.6 s`: the most that a choice costs beyond the best one."""
     worst = float(found.overall[choice])
     return f"{NEVER} finishes" if math.isinf(worst) else quantity(worst, found.unit)
 

@@ -82,7 +82,7 @@ class EpisodeRequest:
             raise ConfigError("--camera shows one run; it does not go with --side-by-side")
 
     def scenarios(self) -> list[AnyScenario]:
-        """Scenarios to run: one, or two that differ by their pattern.
+        """Return scenarios to run: one, or two that differ by their pattern.
 
         Raises:
             ConfigError: it is not there or not valid, or its model has not what is asked for.
@@ -150,7 +150,7 @@ def doubts(played: Sequence[AnyScenario]) -> list[str]:
 
 
 def open_recording(file: Path, pictures: Wanted) -> Opened:
-    """A recorded run that is to be drawn.
+    """Return a recorded run that is to be drawn.
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.

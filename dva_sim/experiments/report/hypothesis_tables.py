@@ -36,7 +36,7 @@ _LEAST_P = 0.001
 
 
 def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellTable:
-    """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
+    """Return each hypothesis: the claim, what was found, the adjusted test, the verdict."""
     heads = ["hypothesis", "claim", "found (interval at the level of the verdict)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
     rows = [
@@ -62,7 +62,7 @@ def _few(tested: Tested, cluster: str) -> str:
 
 
 def _are_few(found: Interval, smallest: float | None, tests: int = 1) -> bool:
-    """True if the test, or ruling out the declared difference, needs more persons."""
+    """Return True if the test, or ruling out the declared difference, needs more persons."""
     if _least_p(found.n_persons, tests) > 1 - LEVEL:
         return True
     return smallest is not None and max(-found.low, found.high) > smallest
@@ -117,7 +117,7 @@ def verdict_lead(
 
 
 def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
-    """Each comparison at each level it runs over."""
+    """Return each comparison at each level it runs over."""
     compared = found.compared
     families = Counter(c.contrast.family for c in compared)
     families.update(t.contrast.family for t in found.tested)
@@ -153,7 +153,7 @@ def _sides(compared: Compared) -> str:
 
 
 def _claim(tested: Tested) -> str:
-    """`A minus B in driving time, at delay 1 s: above 2 s`."""
+    """Return `A minus B in driving time, at delay 1 s: above 2 s`."""
     first, second = (level_name(tested.contrast.factor, x) for x in tested.contrast.contrast)
     where = f", {setting(tested.at)}" if tested.at else ""
     measure = measure_of(tested.contrast.measure, tested.contrast.part)
@@ -161,7 +161,7 @@ def _claim(tested: Tested) -> str:
 
 
 def bound_of(tested: Tested) -> str:
-    """`above 2.0 s`, `below −2.0 s` or `the same within 2.0 s`."""
+    """Return `above 2.0 s`, `below −2.0 s` or `the same within 2.0 s`."""
     claim = tested.hypothesis
     unit = unit_of(tested.contrast.measure)
     margin = quantity(claim.margin, unit) if claim.margin else "zero"
@@ -173,19 +173,19 @@ def bound_of(tested: Tested) -> str:
 
 
 def verdict_of_name(tested: Tested) -> str:
-    """`✓ held: waiting`, in two lines."""
+    """Return `✓ held: waiting`, in two lines."""
     return f"{_VERDICTS[tested.verdict]}\n{tested.name}"
 
 
 def verdict_with_interval(tested: Tested) -> str:
-    """`✓ held: 4.0 s (3.0 to 5.0 s, 90 %)`."""
+    """Return `✓ held: 4.0 s (3.0 to 5.0 s, 90 %)`."""
     if tested.difference is None:
         return _VERDICTS[tested.verdict]
     return f"{_VERDICTS[tested.verdict]}: {_found(tested)}"
 
 
 def _found(tested: Tested) -> str:
-    """`4.0 s (3.0 to 5.0 s, 90 %)`: the difference with the interval that decides."""
+    """Return `4.0 s (3.0 to 5.0 s, 90 %)`: the difference with the interval that decides."""
     text = _interval(tested.difference, tested.contrast.measure)
     return text if tested.difference is None else f"{text[:-1]}, {100 * tested.level:.3g} %)"
 
@@ -227,7 +227,7 @@ _CLAIMS = ("hypotheses", "answer", "comparisons")
 
 
 def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -> CellTable:
-    """Line by line what was registered, beside what was run.
+    """Return line by line what was registered, beside what was run.
 
     The claims are those registered, also where the study as run has others.
 
@@ -261,7 +261,7 @@ def _size(study: Mapping[str, Any], persons: int | None) -> str:
 
 
 def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
-    """The bound that each hypothesis was to be tested against, and what came out."""
+    """Yield the bound that each hypothesis was to be tested against, and what came out."""
     for tested in judged(study, runs).tested if runs else ():
         yield [f"hypothesis {tested.name}", bound_of(tested), verdict_with_interval(tested)]
 

@@ -107,7 +107,7 @@ class KeptAnswer:
 
 
 def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
-    """The answer that a results folder gives, without digests of runs, and its manifest.
+    """Return the answer that a results folder gives, without digests of runs, and its manifest.
 
     Raises:
         ConfigError: the folder holds no results, or a study that is not finished or has failed
@@ -244,7 +244,7 @@ def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
 
 
 def _is_same(before: KeptAnswer, answer: KeptAnswer) -> bool:
-    """True if two answers of a version give the same numbers for the same contrast."""
+    """Return True if two answers of a version give the same numbers for the same contrast."""
     names = "version", "status", "measure", "contrast", "over", "rows", "stale_since"
     return all(getattr(before, name) == getattr(answer, name) for name in names)
 
@@ -316,6 +316,6 @@ def mark_stale(answer: KeptAnswer, version: str, folder: Path) -> None:
 
 
 def all_kept(folder: Path) -> list[KeptAnswer]:
-    """Every answer that is kept in a folder, in the order of the studies' names."""
+    """Return every answer that is kept in a folder, in the order of the studies' names."""
     files = [file for file in sorted(folder.glob("*.json")) if not file.name.endswith(_MANIFEST)]
     return [read(file) for file in files]

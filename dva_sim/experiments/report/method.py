@@ -25,7 +25,7 @@ _FEW = 6  # persons: with fewer nothing can be drawn again
 
 
 def remarks(reading: Reading) -> list[str]:
-    """Remarks on study size, statistics and program version."""
+    """Return remarks on study size, statistics and program version."""
     own = reading.page.method(reading.pair_correlation) if reading.view else None
     lines = _usual(reading) if own is None else own
     study = {"hypotheses": None, "comparisons": None} | reading.study
@@ -47,7 +47,7 @@ def remarks(reading: Reading) -> list[str]:
 
 
 def _size(reading: Reading) -> str:
-    """Persons and trials as they were run, and what decided how many."""
+    """Return persons and trials as they were run, and what decided how many."""
     stopped = reading.manifest.get("stopped") or {}
     stop = reading.study.get("stop") or {}
     return sentence(
@@ -68,7 +68,7 @@ def _size(reading: Reading) -> str:
 
 
 def _trials(reading: Reading) -> str:
-    """Trials per person; by part where they differ."""
+    """Return trials per person; by part where they differ."""
     usual = reading.study.get("replications")
     parts = reading.study.get("parts", {}).items()
     counts = {name: part.get("replications") or usual for name, part in parts}
@@ -134,7 +134,7 @@ def _alike(reading: Reading) -> str:
 
 
 def _reduction(reading: Reading) -> VarianceReduction | None:
-    """Variance reduction of the contrast at its last stop."""
+    """Return the variance reduction of the contrast at its last stop."""
     view = reading.view
     sides = reading.last_sides
     if view is None or sides is None:

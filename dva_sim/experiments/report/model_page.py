@@ -50,11 +50,11 @@ class ModelPage:
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """True if the page suits this kind of study."""
+        """Return True if the page suits this kind of study."""
         return True
 
     def worded(self, finding: Finding) -> Finding:
-        """The finding in the words of this page."""
+        """Return the finding in the words of this page."""
         return replace(finding, cluster=self.cluster)
 
     def answer(self, finding: Finding | None) -> Answer:
@@ -67,7 +67,7 @@ class ModelPage:
         return answer(self.worded(finding))
 
     def cells(self, part: RunGrid) -> CellTable | None:
-        """Every cell of a part, where the page has a table of its own for it."""
+        """Return every cell of a part, where the page has a table of its own for it."""
         return None
 
     def beside(self) -> list[CellTable]:
@@ -80,11 +80,11 @@ class ModelPage:
         factors: Sequence[Factor],
         changed: Sequence[str],
     ) -> list[tuple[str, list[str]]]:
-        """All settings, part by part."""
+        """Return all settings, part by part."""
         return conditions(scenarios, factors, changed)
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """Remarks on method; None for the default ones.
+        """Return remarks on method; None for the default ones.
 
         Args:
             correlation: Correlation between the two sides of the contrast at the last level, if
@@ -94,7 +94,7 @@ class ModelPage:
 
 
 def correlated(correlation: float | None) -> str:
-    """Remark on the correlation of a contrast's two sides; empty if unknown."""
+    """Return the remark on the correlation of a contrast's two sides; empty if unknown."""
     if correlation is None:
         return ""
     return f"The two sides of the contrast correlate with {correlation:.2f} at the last level."
@@ -131,7 +131,7 @@ class TransportPage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """True if the runs measure a session's throughput."""
+        """Return True if the runs measure a session's throughput."""
         return view.part.has("session_down_bps")
 
     def method(self, correlation: float | None) -> list[str] | None:
@@ -170,7 +170,7 @@ class MiddlewarePage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """True if the runs measure the lateness of the link itself."""
+        """Return True if the runs measure the lateness of the link itself."""
         return view.part.has("late_p99_s")
 
     def method(self, correlation: float | None) -> list[str] | None:

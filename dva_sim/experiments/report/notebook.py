@@ -44,7 +44,7 @@ class Episode:
         return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
 
     def __repr__(self) -> str:
-        """Summary of measures and tables."""
+        """Return the summary of measures and tables."""
         values = {name: plain(value) for name, value in self.measures.items()}
         some = listed(f"{name} {value}" for name, value in values.items() if value)
         tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
@@ -62,7 +62,10 @@ class Episode:
 
 
 def episode_of(scenario: AnyScenario, seed: int, tables: Tables, kept: object = None) -> Episode:
-    """A run by its tables; if what is kept of it is a recording, everybody's track is one more."""
+    """Return a run by its tables.
+
+    If what is kept of it is a recording, everybody's track is one more.
+    """
     tracks = {"tracks": track_rows(kept)} if isinstance(kept, Recording) else {}
     made = {name: frame_of(rows) for name, rows in (tables | tracks).items()}
     return Episode(scenario, seed, made)
@@ -96,7 +99,7 @@ class Results(ResultsData):
         return write_report(self.folder)
 
     def _repr_html_(self) -> str:
-        """Notebook display: question, answer and number of runs."""
+        """Return the notebook display: question, answer and number of runs."""
         depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
         notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
         failed = f", {len(self.failures)} failed" if self.failures else ""

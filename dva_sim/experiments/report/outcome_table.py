@@ -23,7 +23,7 @@ from dva_sim.statistics import Interval
 
 
 def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> list[str]:
-    """The contrast at the last stop at which not all went right; nothing without one."""
+    """Return the contrast at the last stop at which not all went right; nothing without one."""
     if finding is None:
         return []
     sides = (finding.first, finding.second)
@@ -59,7 +59,7 @@ def in_a_line(endings: Endings, part: str, failed: int = 0) -> str:
 
 
 def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
-    """Share of each way, line by line at each stop at which not all went right.
+    """Return the share of each way, line by line at each stop at which not all went right.
 
     If there is no such stop where the answer looks, elsewhere.
     """
@@ -91,7 +91,7 @@ _MOST_PLACES = 12
 def _places(
     endings: Endings, view: StudyView, panels: Sequence[Setting]
 ) -> list[tuple[Setting, Level]]:
-    """Panels and stops where not everything went right."""
+    """Return panels and stops where not everything went right."""
     return [
         (panel, stop)
         for panel in panels
@@ -103,7 +103,7 @@ def _places(
 def _rows(
     endings: Endings, view: StudyView, panel: Setting, stop: Level
 ) -> Iterator[tuple[list[tuple[str, Level]], Ended]]:
-    """Each line there, with the levels that name it."""
+    """Yield each line there, with the levels that name it."""
     named = list(panel.items()) if panel != view.panels[0] else []
     named += [(view.over.name, stop)] if view.over else []
     for line in view.lines:
@@ -122,7 +122,7 @@ def _all_right(
 
 
 def _side(view: StudyView, ended: Ended) -> str:
-    """`REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
+    """Return `REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
     name = level_name(view.line.name, ended.line) if view.line else "all"
     clauses = [
         f"{way} {_share(share)}"
@@ -133,7 +133,7 @@ def _side(view: StudyView, ended: Ended) -> str:
 
 
 def _share(found: Interval) -> str:
-    """With its interval, where there are enough persons for one."""
+    """Return a share with its interval, where there are enough persons for one."""
     if not np.isfinite(found.low):
         return percent(found.mean)
     low = percent(found.low).removesuffix("\N{NO-BREAK SPACE}%")
@@ -174,7 +174,7 @@ class EventOutcomes(NamedTuple):
         return bool(self.missed or self.believed)
 
     def __str__(self) -> str:
-        """`Events: 288, of which 263 were confirmed, 23 missed (real but refuted: ...)`."""
+        """Return `Events: 288, of which 263 were confirmed, 23 missed (real but refuted: ...)`."""
         return sentence(
             "events",
             e=self,

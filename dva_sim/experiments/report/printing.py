@@ -22,7 +22,7 @@ _NODES = re.compile(rb"(?<=\(node)\d{8}(?=\))")  # the browser's own numbers of 
 
 
 def browser() -> str | None:
-    """Path of a browser that can print without a window; None if there is none."""
+    """Return the path of a browser that can print without a window; None if there is none."""
     return next((found for name in BROWSERS if (found := shutil.which(name))), None)
 
 

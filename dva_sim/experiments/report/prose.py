@@ -36,7 +36,7 @@ def paragraphs(name: str, **facts: Any) -> list[str]:
 
 
 def _in_a_line(text: str) -> str:
-    """Without the breaks of lines, which say nothing; a space that does not break stays."""
+    """Return text without line breaks, which say nothing; a space that does not break stays."""
     return re.sub(r"[ \n]+", " ", text).strip(" ")
 
 
@@ -54,7 +54,7 @@ _HEAD = re.compile(r"^== (\w+) ==\n", re.MULTILINE)
 
 @cache
 def _sections(name: str) -> dict[str, str]:
-    """The texts of a template by the names above them."""
+    """Return the texts of a template by the names above them."""
     environment = _environment()
     assert environment.loader is not None
     source, _, _ = environment.loader.get_source(environment, f"{name}.txt.j2")

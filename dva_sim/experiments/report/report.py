@@ -73,7 +73,7 @@ _KINDS = {
 
 
 def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
-    """The whole report below its title.
+    """Return the whole report below its title.
 
     Args:
         reading: The results.
@@ -116,7 +116,7 @@ def _status(reading: Reading) -> Iterator[Block]:
 
 
 def _events(reading: Reading) -> Iterator[Block]:
-    """The line on event outcomes, unless it is already among the warnings."""
+    """Yield the line on event outcomes, unless it is already among the warnings."""
     if reading.events is not None and not reading.events.warns:
         yield Words(str(reading.events), "note")
 
@@ -168,7 +168,10 @@ def _comparisons(reading: Reading) -> Iterator[Block]:
 
 
 def _endings(reading: Reading) -> Iterator[Block]:
-    """Table of outcomes if some runs went wrong; else a line, unless the answer has one."""
+    """Yield the table of outcomes if some runs went wrong.
+
+    Else a line, unless the answer has one.
+    """
     endings = reading.endings
     view = reading.view
     if endings is None or view is None:
@@ -206,7 +209,7 @@ def _found(reading: Reading) -> Iterator[Block]:
 
 
 def _what_varied(reading: Reading) -> Iterator[Block]:
-    """Before the figures, whose words must be known."""
+    """Yield what varied, before the figures, whose words must be known."""
     factors = [f for f in factors_of(reading.study) if f.name != POINT]
     design = reading.study.get("design") or {}
     lines = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
@@ -250,7 +253,7 @@ _SAMPLED = {
 
 
 def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
-    """All others than the one that answers; what several share is said once."""
+    """Yield all others than the one that answers; what several share is said once."""
     if not drawn or reading.view is None:
         return
     yield Heading("Figures")
@@ -312,7 +315,7 @@ def _method(reading: Reading) -> Iterator[Block]:
 
 
 def _words(blocks: Sequence[Block]) -> Iterator[Block]:
-    """Glossary of the terms used in the report."""
+    """Yield the glossary of the terms used in the report."""
     if terms := terms_in(texts_of(blocks)):
         yield Heading(WORDS)
         entries = tuple((term.name, f"{term.means}.") for term in terms)
@@ -324,7 +327,7 @@ def _levels(name: str, levels: Sequence[Any]) -> str:
 
 
 def _in_full(name: str, level: Any) -> str:
-    """A level with the file it is from, if it is a class in one."""
+    """Return a level with the file it is from, if it is a class in one."""
     file = f" ({level.rpartition(':')[0]})" if is_in_file(level) else ""
     return level_name(name, level) + file
 
@@ -374,7 +377,7 @@ def write_page(reading: Reading, pdf: bool = False) -> Path:
 
 
 def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
-    """Each figure as vectors, as pixels, and as the numbers behind it; none of an older report."""
+    """Write each figure as vectors, pixels, and the numbers behind it; none of an old report."""
     folder.mkdir(exist_ok=True)
     made = {
         f"{figure.name}.{ending}": content
@@ -415,7 +418,7 @@ def _template() -> jinja2.Template:
 
 
 def _key(text: str) -> str:
-    """A heading as an identifier."""
+    """Return a heading as an identifier."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
 
 

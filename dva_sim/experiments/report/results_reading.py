@@ -60,7 +60,7 @@ class ResultsReading:
         return f"Reading of {self.results.folder}"
 
     def table(self, name: str) -> Table:
-        """Columns of a table; nothing where the study has no such table."""
+        """Return columns of a table; nothing where the study has no such table."""
         if name not in self._tables:
             table: Table = self.results.table(name) if self.results.has(name) else {}
             if name == "runs" and self.results.has("events") and self._is_of_events(table):
@@ -70,7 +70,7 @@ class ResultsReading:
         return self._tables[name]
 
     def _is_of_events(self, runs: Table) -> bool:
-        """True if the answer is about events rather than drives."""
+        """Return True if the answer is about events rather than drives."""
         view = view_of(self.study, runs) if runs else None
         measure = None if view is None or view.contrast is None else view.measure
         ends_by_event = page_of(self.scenarios.values()).ends_by_event
@@ -93,7 +93,7 @@ class ResultsReading:
         return found
 
     def scenario_of(self, part: str) -> Mapping[str, Any]:
-        """One part's scenario."""
+        """Return one part's scenario."""
         return self.scenarios.get(part, {})
 
     @cached_property
@@ -208,7 +208,7 @@ class ResultsReading:
         return found if np.isfinite(found) else None
 
     def trials_of(self, part: str) -> int:
-        """Trials per person in a part; 0 if unknown."""
+        """Return trials per person in a part; 0 if unknown."""
         own = (self.study.get("parts", {}).get(part) or {}).get("replications")
         return int(own or self.study.get("replications") or 0)
 
@@ -221,6 +221,6 @@ PAGES: dict[str, type[ModelPage]] = {
 
 
 def page_of(scenarios: Iterable[Mapping[str, Any]]) -> type[ModelPage]:
-    """The page of a study: that of the first of its models that has one of its own."""
+    """Return the page of a study: that of the first of its models that has one of its own."""
     models = (str(scenario.get("model")) for scenario in scenarios)
     return next((PAGES[model] for model in models if model in PAGES), ModelPage)

@@ -70,18 +70,18 @@ class ShiftPage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """True if the study compares policies."""
+        """Return True if the study compares policies."""
         return is_dispatch(view)
 
     def worded(self, finding: Finding) -> Finding:
-        """Along the load of people, where that is known."""
+        """Return the finding along the load of people, where that is known."""
         loads = [round(load, 2) for load in self.shifts.loads if load is not None]
         if len(loads) == len(self.shifts.stops):
             finding = replace(finding, over="load", levels=tuple(loads))
         return replace(finding, cluster="shift")
 
     def answer(self, finding: Finding | None) -> Answer:
-        """The declared contrast first; then what it is paid with, and what was best."""
+        """Return the declared contrast first; then what it is paid with, and what was best."""
         if finding is None:
             return Answer(
                 "No contrast was declared that could answer the question; figures show the runs.",
@@ -93,7 +93,7 @@ class ShiftPage(ModelPage):
         return replace(found, depends=found.depends | price, notes=notes)
 
     def cells(self, part: RunGrid) -> CellTable | None:
-        """Table of the answer's part, with percentiles over all its events."""
+        """Return the table of the answer's part, with percentiles over all its events."""
         return _cells(self.shifts) if part.name == self.view.part.name else None
 
     def conditions(
@@ -102,7 +102,7 @@ class ShiftPage(ModelPage):
         factors: Sequence[Factor],
         changed: Sequence[str],
     ) -> list[tuple[str, list[str]]]:
-        """Conditions common to all policies, part by part."""
+        """Return conditions common to all policies, part by part."""
         parts = list(scenarios.values())
         if not parts:
             return []
@@ -130,7 +130,7 @@ class ShiftPage(ModelPage):
 
 
 def _cells(shifts: Shifts) -> CellTable:
-    """Every cell of the part the answer speaks of, with percentiles over all its events.
+    """Return every cell of the part the answer speaks of, with percentiles over all its events.
 
     Percentiles are pooled: the mean of the shifts' own would leave out the shifts that do not
     reach them, which are the worst. Panels of which the answer does not speak have a dash.
@@ -152,7 +152,7 @@ def _cells(shifts: Shifts) -> CellTable:
 
 
 def _percentiles(events: Table, follow: float) -> list[str]:
-    """Percentiles of one cell."""
+    """Return percentiles of one cell."""
     values = pooled(events, [q / 100 for q in PERCENTILES], follow)[0]
     over = f"> {follow:g}"
     return [over if np.isposinf(value) else number(float(value)) for value in values]
@@ -204,7 +204,7 @@ def _quickest(shifts: Shifts, stop: int) -> tuple[str, float, list[str]]:
 
 
 def _twins(shifts: Shifts) -> list[str]:
-    """Policies that came to the very same response in every shift at every load."""
+    """Return policies that came to the very same response in every shift at every load."""
     response = shifts.of("response_mean_s")
     groups: dict[bytes, list[str]] = {}
     for place, policy in enumerate(shifts.policies):
@@ -222,7 +222,7 @@ def _contained(shifts: Shifts, stop: int, title: str) -> str:
 
 
 def _progress(shifts: Shifts, stop: int, title: str) -> str:
-    """`89 % at load 0.31 (min_eta, 24 to 154 %)`: the best policy's share of the way."""
+    """Return `89 % at load 0.31 (min_eta, 24 to 154 %)`: the best policy's share of the way."""
     found = shifts.progress(stop)
     best = int(np.nanargmax(found.mean))
     low, high = (100 * float(edge[best]) for edge in (found.low, found.high))
@@ -248,7 +248,7 @@ def _team(scenario: Mapping[str, Any]) -> str:
 
 
 def _alarms(scenario: Mapping[str, Any]) -> str:
-    """Events per hour and share of false ones, at intensity 1."""
+    """Return events per hour and share of false ones, at intensity 1."""
     streams = [s for s in scenario.get("demand", []) if (s.get("between") or {}).get("mean_s")]
     rates = [3600.0 / s["between"]["mean_s"] for s in streams]
     if not rates:

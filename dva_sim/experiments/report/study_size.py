@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def size_of(reading: Reading) -> str:
-    """`A smaller version of X: 4 persons × 2 trials, 440 runs ... Its usual size: ...`."""
+    """Return `A smaller version of X: 4 persons × 2 trials, 440 runs ... Its usual size: ...`."""
     study = reading.study
     usual = reading.manifest.get("usual") or {}
     return sentence(
@@ -55,7 +55,7 @@ def not_reached(reading: Reading) -> str:
 
 
 def _measure_of(study: Mapping[str, Any], stop: Mapping[str, Any]) -> str:
-    """Column that a stopping rule looks at."""
+    """Return the column that a stopping rule looks at."""
     if stop.get("measure"):
         return str(stop["measure"])
     contrasts = {**study.get("comparisons", {}), "answer": study.get("answer")}
@@ -76,7 +76,7 @@ def _people(persons: int, trials: int | None, cluster: str) -> str:
 
 
 def _weight(size: Mapping[str, Any]) -> float:
-    """Number of runs in one part."""
+    """Return the number of runs in one part."""
     count = float(size.get("persons") or 1) * float(size.get("replications") or 1)
     for levels in (size.get("factors") or {}).values():
         count *= len(levels)
@@ -84,7 +84,7 @@ def _weight(size: Mapping[str, Any]) -> float:
 
 
 def _usually(reading: Reading, usual: Mapping[str, Any]) -> list[str]:
-    """Settings of the study's own file that this run changed."""
+    """Return settings of the study's own file that this run changed."""
     here = reading.study.get("factors") or {}
     levels = [
         f"{len(levels)} levels of {factor_name(name)} (here {len(here.get(name, ()))})"
@@ -95,7 +95,7 @@ def _usually(reading: Reading, usual: Mapping[str, Any]) -> list[str]:
 
 
 def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
-    """A line for each plan."""
+    """Return a line for each plan."""
     heads = ["to show", "if the true difference is"]
     heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
     rows = [
@@ -106,7 +106,7 @@ def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
 
 
 def plan_lines(found: Sequence[SizePlan], cluster: str) -> list[str]:
-    """A line for each plan, and what they assume."""
+    """Return a line for each plan, and what they assume."""
     lines = [
         f"To show {p.name} ({p.what}), if the true difference is {p.assumed}: {_line(p, cluster)}."
         for p in found

@@ -87,13 +87,13 @@ class Reading(ResultsReading):
         return ["No answer was declared for these levels: this is their only contrast."] * is_taken
 
     def _verdicts(self, tested: Sequence[Tested]) -> str:
-        """The registered hypotheses and what they depend on."""
+        """Return the registered hypotheses and what they depend on."""
         beyond = any(self._is_extrapolated(claim) for claim in tested)
         model = only_model(self, tested[0].contrast.part)
         return verdict_lead(tested, self.cluster, is_extrapolated=beyond, only_model=model)
 
     def _is_extrapolated(self, claim: Tested) -> bool:
-        """True if a side of a hypothesis lies beyond the delays people were watched at."""
+        """Return True if a side of a hypothesis lies beyond the delays people were watched at."""
         name = claim.contrast.part
         factor = claim.contrast.factor
         part = part_of(self.study, self.runs, name)
@@ -160,7 +160,7 @@ class Reading(ResultsReading):
         )
 
     def _taken_together(self, part: RunGrid) -> list[str]:
-        """Factors of a zip that another one stands for."""
+        """Return factors of a zip that another one stands for."""
         axes = [factor.name for factor in part.factors]
         zipped = (self.study.get("design") or {}).get("zip") or ()
         return [name for name in zipped if name not in axes]
@@ -221,7 +221,7 @@ def few_that_weigh(finding: Finding, view: StudyView) -> str:
 
 
 def _differences(finding: Finding, view: StudyView, stop: int) -> tuple[Floats, NDArray[Any]]:
-    """First minus second, run by run, and whose they are."""
+    """Return the first minus second, run by run, and whose they are."""
     values = view.values
     panel = view.panels[0]
     first, second = (
@@ -231,7 +231,7 @@ def _differences(finding: Finding, view: StudyView, stop: int) -> tuple[Floats, 
 
 
 def in_context(reading: ResultsReading) -> Finding | None:
-    """The finding with the range over other settings and over models of the persons."""
+    """Return the finding with the range over other settings and over models of the persons."""
     view = reading.view
     finding = reading.finding
     if view is None or finding is None or (stop := telling_stop(finding)) is None:
@@ -260,7 +260,7 @@ def only_model(reading: ResultsReading, part: str) -> str:
 
 
 def _together(own: float, found: list[tuple[float, float, float]]) -> OtherRuns | None:
-    """The outer limits of intervals, and the range of their means; None without any."""
+    """Return the outer limits of intervals, and the range of their means; None without any."""
     if not found:
         return None
     means, lows, highs = zip(*found, strict=True)
@@ -274,7 +274,7 @@ def _together(own: float, found: list[tuple[float, float, float]]) -> OtherRuns 
 
 
 def useful_counts(view: StudyView) -> tuple[tuple[Level, Level], ...]:
-    """Each side of the contrast with the last count that is shown to help more than the one before.
+    """Return each side of the contrast with the last count shown to help more than the one before.
 
     The band covers all steps of both sides at once. Where no step helps, the count is the first.
 

@@ -44,7 +44,7 @@ def show(
 
 
 def show_results(results: Results, console: Console) -> None:
-    """Question, status, answer, warnings, every cell, and where it comes from."""
+    """Print question, status, answer, warnings, every cell, and where it comes from."""
     reading = Reading(results)
     console.print(f"[bold]{escape(results.question)}[/bold]", soft_wrap=True)
     if results.partial:
@@ -77,7 +77,7 @@ def show_results(results: Results, console: Console) -> None:
 
 
 def show_table(results: Results, name: str, rows: int, console: Console) -> None:
-    """The first rows of a table.
+    """Print the first rows of a table.
 
     Raises:
         ConfigError: no such table.
@@ -108,7 +108,7 @@ def show_columns(results: Results, tables: Sequence[str], console: Console) -> N
 
 
 def program(results: Results) -> str:
-    """Version of the program that made the results."""
+    """Return the version of the program that made the results."""
     versions = results.manifest.get("versions", {})
     text = f"dva-sim {versions.get('dva-sim')}"
     if commit := versions.get("commit"):
@@ -121,7 +121,7 @@ def program(results: Results) -> str:
 def print_table(
     heads: Sequence[str], rows: Sequence[Sequence[str]], console: Console, labels: int = 0
 ) -> None:
-    """Columns side by side as far as there is room; the names of the others in a line.
+    """Print columns side by side as far as there is room; the names of the others in a line.
 
     Args:
         heads: Column headings.
@@ -154,7 +154,7 @@ def print_table(
 
 
 def _facts(reading: Reading) -> Iterator[str]:
-    """Status, size, program and machine, each in a line."""
+    """Yield status, size, program and machine, each in a line."""
     results = reading.results
     manifest = reading.manifest
     study = reading.study

@@ -60,7 +60,7 @@ _Write = Callable[[Path], object]
 def _files(
     results: Results, out: Path, tables: Sequence[str], form: str | None
 ) -> dict[Path, _Write]:
-    """Writers of the output files, by path."""
+    """Return writers of the output files, by path."""
     if form is not None and form not in FORMATS:
         raise ConfigError(f"--format {form!r} should be {either(FORMATS)}")
     ending = out.suffix.removeprefix(".")
@@ -115,7 +115,7 @@ def _write_dictionary(results: Results, tables: Sequence[str], path: Path) -> No
 
 
 def _put(path: Path, write: _Write) -> None:
-    """A file whole or not at all."""
+    """Put a file there whole or not at all."""
     import duckdb
 
     try:

@@ -54,7 +54,7 @@ class FolderLock:
             raise DvaSimError(f"{folder} cannot be written: {error.strerror}") from None
 
     def _taken(self) -> int:
-        """The open file, locked; opened again if its last owner removed it meanwhile."""
+        """Return the open file, locked; opened again if its last owner removed it meanwhile."""
         while True:
             file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
             try:
@@ -109,7 +109,7 @@ def _locked(file: int, path: Path) -> bool:
 
 
 def _is(file: int, path: Path) -> bool:
-    """True if a path still refers to an open file."""
+    """Return True if a path still refers to an open file."""
     try:
         return os.path.samestat(os.fstat(file), path.stat())
     except FileNotFoundError:

@@ -33,7 +33,7 @@ _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
 
 def manifest_of(plan: StudyPlan) -> dict[str, Any]:
-    """Manifest of a plan, independent of time, place and speed.
+    """Return the manifest of a plan, independent of time, place and speed.
 
     Its `hash` is the identity of the results: a folder holds one study, of one program.
     """
@@ -72,7 +72,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str | bool | None]:
-    """The program and what its numbers depend on.
+    """Return the program and what its numbers depend on.
 
     The commit is no part of the identity: the fingerprint tells whether anything that simulates
     has changed, so a study goes on when only a report or a text has. The commit is then that of
@@ -82,18 +82,21 @@ def versions() -> dict[str, str | bool | None]:
 
 
 def _simulating() -> dict[str, str]:
-    """Versions that the numbers of a run depend on; each folder holds runs of one set only."""
+    """Return versions that the numbers of a run depend on.
+
+    Each folder holds runs of one set only.
+    """
     packages = {name: version(name) for name in _PACKAGES}
     return {"dva-sim": __version__, "fingerprint": fingerprint()} | packages
 
 
 def failures(todo: Sequence[StudyRun], failed: Mapping[RunKey, str]) -> list[dict[str, Any]]:
-    """Failed runs, with the reason, in the order of the design."""
+    """Return the failed runs, with the reason, in the order of the design."""
     return [design_row(j) | {"error": failed[j.key]} for j in todo if j.key in failed]
 
 
 def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str, Any]:
-    """Details that differ between machines and times.
+    """Return details that differ between machines and times.
 
     Args:
         todo: The runs of the study.
@@ -111,7 +114,7 @@ def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:
-    """Whole or not at all, whatever happens meanwhile.
+    """Write whole or not at all, whatever happens meanwhile.
 
     Raises:
         DvaSimError: the disk is full or refuses to be written.
@@ -123,7 +126,7 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
 
 
 def status_of(manifest: Mapping[str, Any]) -> Status:
-    """Status of the results; judged from the settings if the manifest states none.
+    """Return status of the results; judged from the settings if the manifest states none.
 
     A confirmation has all the runs that were registered. Runs that took too long are others on
     another machine. The current program computes the verdicts again whenever they are shown.
@@ -152,7 +155,7 @@ def _judged_again(status: Status) -> Status:
 
 
 def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
-    """The status of results in which some runs are missing."""
+    """Return the status of results in which some runs are missing."""
     if not failed:
         return status
     confirmed = status.kind == "confirmatory"

@@ -96,7 +96,7 @@ def _meaning(
 
 
 def _of_model(model: str, table: str, name: str) -> str:
-    """Meaning of a column in a shipped model; empty for other models."""
+    """Return the meaning of a column in a shipped model; empty for other models."""
     columns = MODELS[model].columns.get(table, ()) if model in MODELS else ()
     return next((column.meaning for column in columns if column.name == name), "")
 
@@ -118,11 +118,11 @@ class Frame(dict[str, Array]):
         return len(next(iter(self.values()), ()))
 
     def where(self, rows: Array | slice) -> Frame:
-        """Some rows, by a mask or by their numbers."""
+        """Return some rows, by a mask or by their numbers."""
         return Frame({name: values[rows] for name, values in self.items()})
 
     def to_rows(self) -> list[dict[str, Any]]:
-        """Row by row, each with its value of every column."""
+        """Return the row by row, each with its value of every column."""
         columns = [values.tolist() for values in self.values()]
         return [dict(zip(self, row, strict=True)) for row in zip(*columns, strict=True)]
 
@@ -174,7 +174,7 @@ class Frame(dict[str, Array]):
 
 
 def frame_of(rows: Sequence[Mapping[str, Any]]) -> Frame:
-    """Rows as columns; what a row does not say is missing."""
+    """Return rows as columns; what a row does not say is missing."""
     names = dict.fromkeys(name for row in rows for name in row)
     return Frame({name: _column([row.get(name) for row in rows]) for name in names})
 
@@ -189,7 +189,7 @@ def _column(values: list[Any]) -> Array:
 
 
 def plain(value: Any) -> str:
-    """A value as text: four figures of a number, nothing for what is missing."""
+    """Return a value as text: four figures of a number, nothing for what is missing."""
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return ""
     if isinstance(value, bool | np.bool_):
@@ -198,7 +198,7 @@ def plain(value: Any) -> str:
 
 
 def without_mask(column: Array) -> Array:
-    """A column without numpy's mask; whole numbers with missing values come as floats."""
+    """Return a column without numpy's mask; whole numbers with missing values come as floats."""
     if not isinstance(column, np.ma.MaskedArray):
         return column
     if column.dtype.kind == "f":
@@ -214,7 +214,7 @@ def without_mask(column: Array) -> Array:
 
 
 def _masked(values: Array) -> Array:
-    """A column for duckdb, which takes what is masked for NULL."""
+    """Return a column for duckdb, which takes what is masked for NULL."""
     if values.dtype.kind != "f":
         return values
     return np.ma.masked_array(values, mask=np.isnan(values))
@@ -228,12 +228,12 @@ _NOT_AS_WRITTEN = "is damaged, edited or of other results; the study's command m
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of every table in a folder, by the table's name."""
+    """Return SHA-256 of every table in a folder, by the table's name."""
     return {path.stem: digest_of(path) for path in sorted(folder.glob("*.parquet"))}
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -347,7 +347,7 @@ class Results:
         return sorted(path.stem for path in self._tables.glob("*.parquet"))
 
     def has(self, name: str) -> bool:
-        """True if the study wrote a table of that name."""
+        """Return True if the study wrote a table of that name."""
         return name in self.tables
 
     @cached_property
@@ -362,7 +362,7 @@ class Results:
         return self.table("runs")
 
     def columns(self, table: str) -> list[Column]:
-        """Meanings of a table's columns.
+        """Return meanings of a table's columns.
 
         Raises:
             ConfigError: no such table, or a damaged file.
@@ -374,7 +374,7 @@ class Results:
         return describe(table, self.names(table), list(models), factors, described)
 
     def names(self, table: str) -> list[str]:
-        """The columns of a table, without its rows being read.
+        """Return the columns of a table, without its rows being read.
 
         Raises:
             ConfigError: no such table, or a damaged file.
@@ -382,7 +382,7 @@ class Results:
         return list(self._read(table, "*", "LIMIT 0"))
 
     def path_of(self, table: str) -> Path:
-        """The Parquet file of a table.
+        """Return the Parquet file of a table.
 
         Raises:
             ConfigError: no such table, or another than the manifest was written beside.
@@ -401,7 +401,7 @@ class Results:
     def table(
         self, name: str, part: str | None = None, columns: Sequence[str] | None = None
     ) -> Frame:
-        """The columns of a table, in the order of the rows (part, cell, person, trial).
+        """Return the columns of a table, in the order of the rows (part, cell, person, trial).
 
         Missing values are nan in columns of numbers and None in all others; a column of
         whole numbers with missing values comes as floats.
@@ -440,7 +440,7 @@ class Results:
         return set()
 
     def __repr__(self) -> str:
-        """Summary of contents and queries, without reading a table."""
+        """Return the summary of contents and queries, without reading a table."""
         runs = self.manifest.get("runs", 0)
         cells = len(self.manifest.get("cells", ()))
         failed = f", {len(self.failures)} failed" if self.failures else ""
@@ -455,19 +455,19 @@ class Results:
 
 @cache
 def _database() -> DuckDBPyConnection:
-    """Reads all tables of a process: to open one takes longer than to read a table."""
+    """Return the reader of all tables of a process: opening one takes longer than reading."""
     import duckdb
 
     return duckdb.connect(config={"threads": 1, "enable_external_file_cache": False})
 
 
 def escaped(path: Path) -> str:
-    """A path for DuckDB, to which `?`, `*` and `[` in it would mean several files."""
+    """Return a path for DuckDB, to which `?`, `*` and `[` in it would mean several files."""
     return re.sub(r"[?*\[]", r"[\g<0>]", str(path))
 
 
 def quoted(name: str) -> str:
-    """The name of a column, as SQL takes it."""
+    """Return the name of a column, as SQL takes it."""
     return '"' + name.replace('"', '""') + '"'
 
 

@@ -70,7 +70,7 @@ def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) ->
 
 
 def design_row(job: StudyRun) -> Row:
-    """The columns that say which run it was; a reference run has no levels."""
+    """Return the columns that say which run it was; a reference run has no levels."""
     return {
         "part": job.part,
         "cell": job.cell,
@@ -84,7 +84,7 @@ def design_row(job: StudyRun) -> Row:
 
 
 def _write(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> list[Path]:
-    """All tables of some runs."""
+    """Return all tables of some runs."""
     factors = dict.fromkeys(factor for job in jobs for factor in job.levels)
     design: Columns = {c: set() for c in (*_BEFORE_LEVELS, *factors, *_BEHIND_LEVELS)}
     tables: dict[str, _Table] = {}
@@ -105,7 +105,7 @@ def _write(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> list[
 
 
 def _rows(jobs: Iterable[StudyRun], tables_of: TablesOf) -> Iterator[tuple[str, list[Row]]]:
-    """The rows of each table of each run, with the columns that say which run it was."""
+    """Yield the rows of each table of each run, with the columns that say which run it was."""
     for job in jobs:
         design = design_row(job)
         for table, rows in (tables_of(job.key) or {}).items():
@@ -155,7 +155,7 @@ class _Table:
             self._pass_on()
 
     def is_whole(self) -> bool:
-        """True if every row fitted the columns and types of the table."""
+        """Return True if every row fitted the columns and types of the table."""
         self._pass_on()
         return self._fits
 
@@ -171,7 +171,7 @@ class _Table:
         return path
 
     def _pass_on(self) -> None:
-        """A batch of what waits goes to the database, as long as the table there fits."""
+        """Pass a batch of what waits to the database, as long as the table there fits."""
         batch = self._waiting[:_BATCH_ROWS]
         self._waiting = self._waiting[_BATCH_ROWS:]
         columns = dict.fromkeys(chain(self._seen, *batch))
@@ -200,7 +200,7 @@ def _sql_type(types: set[type]) -> str:
 
 
 def _array(values: list[Value], kind: str) -> NDArray[Any]:
-    """A column for DuckDB; what is missing is masked, and becomes NULL."""
+    """Return a column for DuckDB; what is missing is masked, and becomes NULL."""
     if kind == "VARCHAR":
         texts = [v if v is None or isinstance(v, str) else str(v) for v in values]
         return np.array(texts, dtype=object)

@@ -25,15 +25,15 @@ class Address(NamedTuple):
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
-        """Address in a row of a table or of a manifest's cells."""
+        """Return address in a row of a table or of a manifest's cells."""
         return cls(row["part"], row["cell"], row.get("person"), row.get("trial"))
 
     @classmethod
     def all_of(cls, table: Mapping[str, Any]) -> list[Self]:
-        """Addresses of all rows of a table, given by its columns."""
+        """Return addresses of all rows of a table, given by its columns."""
         return list(map(cls, *(table[name].tolist() for name in cls._fields)))
 
     def __str__(self) -> str:
-        """Text as in names of files: `drive-3-0-1`, or `drive-reference-0-1`."""
+        """Return the text as in names of files: `drive-3-0-1`, or `drive-reference-0-1`."""
         cell = "reference" if self.cell == REFERENCE else self.cell
         return "-".join(map(str, (self.part, cell, *(n for n in self[2:] if n is not None))))

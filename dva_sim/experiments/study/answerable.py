@@ -40,7 +40,7 @@ def only_contrast(factors: Mapping[str, Sequence[Level]]) -> PossibleContrast | 
 
 
 def compared_factors(study: Study) -> dict[str, Sequence[Level]]:
-    """Factors as the analysis lays them out: points are trials, a zip is one factor."""
+    """Return factors as the analysis lays them out: points are trials, a zip is one factor."""
     design = study.design
     zipped = tuple(design.zip or ()) if design is not None else ()
     aside = {POINT, *zipped[1:]}
@@ -137,6 +137,6 @@ def of_few_persons(persons: int) -> str:
 
 
 def coverage_in_words(coverage: Coverage) -> str:
-    """`in 93 % of studies if differences have skewness 2, and in 89 % at skewness 6`."""
+    """Return `in 93 % of studies if differences have skewness 2, and in 89 % at skewness 6`."""
     mild, strong = (f"{100 * share:.0f} %" for share in coverage)
     return f"in {mild} of studies if differences have skewness 2, and in {strong} at skewness 6"

@@ -37,7 +37,7 @@ from dva_sim.simulation.run_measures import COVARIATES
 
 
 def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
-    """The mistake at what makes it; as it is if a file has been named.
+    """Return the mistake at what makes it; as it is if a file has been named.
 
     Args:
         study: Study that runs the scenario.
@@ -64,7 +64,7 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
 
 
 def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
-    """Places where the study may give a scenario key that value."""
+    """Yield places where the study may give a scenario key that value."""
     yield "factors", key
     yield "parts", part, "reference", key
     yield "parts", part, "changes", key
@@ -158,7 +158,7 @@ class StudyJob(StudyRun):
 
 
 def cells(study: Study, inputs: StudyInputs | None = None) -> list[DesignCell]:
-    """All configurations, by part, the reference first, then those of the design in order.
+    """Return all configurations, by part, the reference first, then those of the design in order.
 
     The repeats of the answer come last, as if they were a part of their own.
 
@@ -223,19 +223,19 @@ def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
 
 
 def base_scenario(inputs: StudyInputs, part: str) -> AnyScenario:
-    """A part's scenario before any factor has changed it."""
+    """Return a part's scenario before any factor has changed it."""
     return _build(inputs, part, _every_change(inputs, part, {}))
 
 
 def basis_of_tuning(inputs: StudyInputs) -> TuningBasis:
-    """The persons and phones that tuned values should rest on."""
+    """Return the persons and phones that tuned values should rest on."""
     assert inputs.study.tuning is not None
     scenario = base_scenario(inputs, inputs.study.tuning.part).model_dump(mode="json")
     return TuningBasis.of(scenario.get("operator", {}).get("population", "operators"))
 
 
 def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJob]:
-    """All runs in a fixed order: part, cell, person, trial; the repeats last.
+    """Return all runs in a fixed order: part, cell, person, trial; the repeats last.
 
     Args:
         grid: Its cells, if they have been made already.
@@ -263,7 +263,7 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
 
 
 def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
-    """The runs that a manifest tells of, in the order of `jobs`.
+    """Return the runs that a manifest tells of, in the order of `jobs`.
 
     Args:
         manifest: Manifest of a study that may be running; only its study and cells are read.
@@ -281,13 +281,16 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
 def to_rehearse(
     study: Study, every: Iterable[DesignCell], inputs: StudyInputs | None = None
 ) -> list[DesignCell]:
-    """The cells in which a mistake would show: instead of points in ranges, the ranges' ends."""
+    """Return the cells in which a mistake would show.
+
+    Instead of points in ranges, the ranges' ends.
+    """
     ends = _at_ends(inputs or StudyInputs(study))
     return [*ends, *(cell for cell in every if not (ends and cell.levels))]
 
 
 def _at_ends(inputs: StudyInputs) -> list[DesignCell]:
-    """Cells at both ends of every range, whichever points are drawn; none without ranges.
+    """Return cells at both ends of every range, whichever points are drawn; none without ranges.
 
     Raises:
         ConfigError: a range has an end that is not valid.
@@ -311,7 +314,7 @@ def _cells_at(
 
 
 def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
-    """The answer's contrast under every strategy and every set of parameters."""
+    """Yield the answer's contrast under every strategy and every set of parameters."""
     study = inputs.study
     factors = factors_of_repeats(study)
     if not factors or study.answer is None:
@@ -329,7 +332,7 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
 
 
 def _changes(inputs: StudyInputs, levels: Mapping[str, Level]) -> dict[str, Any]:
-    """Scenario changes that the levels of a cell make."""
+    """Return the scenario changes that the levels of a cell make."""
     changes: dict[str, Any] = {}
     for factor, level in levels.items():
         if factor in inputs.study.treatments:
@@ -356,7 +359,7 @@ def _cell(
 
 
 def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """All changes to a scenario's file: by the part, by `--set` and by the cell."""
+    """Return all changes to a scenario's file: by the part, by `--set` and by the cell."""
     study = inputs.study
     part = _source_of(inputs.study, part)
     fixed = {**study.parts[part].changes, **study.changes}
@@ -395,7 +398,7 @@ def rehearse(study: Study, cell: DesignCell) -> None:
 
 
 def _source_of(study: Study, part: str) -> str:
-    """The part whose scenario is run: repeats have that of the answer."""
+    """Return the part whose scenario is run: repeats have that of the answer."""
     return study.answer.part if part == REPEATS and study.answer is not None else part
 
 
@@ -411,7 +414,7 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _draws(study: Study, parts: Iterable[str]) -> dict[str, list[tuple[int, int, int]]]:
-    """Person, trial and seed of each run in a cell of every part, in order."""
+    """Return the person, trial and seed of each run in a cell of every part, in order."""
     found = {}
     for name in parts:
         persons, trials, part = _size(study, name)
@@ -423,7 +426,10 @@ def _draws(study: Study, parts: Iterable[str]) -> dict[str, list[tuple[int, int,
 
 
 def _size(study: Study, name: str) -> tuple[int, int, str]:
-    """Persons, trials, and the part whose random seeds it has: a repeat shares its part's."""
+    """Return persons, trials, and the part whose random seeds it has.
+
+    A repeat shares its part's.
+    """
     if name == REPEATS and study.robustness is not None and study.answer is not None:
         persons = min(study.robustness.persons, study.persons)
         return persons, study.robustness.replications, study.answer.part

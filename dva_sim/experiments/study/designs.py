@@ -64,7 +64,7 @@ class ValueRange(Config):
 
 
 def _spelled_out(value: Any) -> Any:
-    """`[low, high]` is short for a linear range."""
+    """Return a linear range for `[low, high]`."""
     if isinstance(value, list | tuple) and len(value) == 2:
         return {"low": value[0], "high": value[1]}
     return value
@@ -147,7 +147,7 @@ class Design(Config):
 def all_factors(
     design: Design | None, declared: Mapping[str, Levels], rows: Sequence[Row]
 ) -> dict[str, Levels]:
-    """Every factor with its levels: those that the design brings first, then those declared.
+    """Return every factor with its levels: those that the design brings first, then those declared.
 
     Listed levels come in the order met. Points in ranges have one factor, their number; so have
     listed rows whose levels are so many that their grid would be nearly empty.
@@ -163,7 +163,7 @@ def all_factors(
 
 
 def keys_of(design: Design | None, rows: Sequence[Row]) -> list[str]:
-    """The factors that a design brings, beside those declared."""
+    """Return the factors that a design brings, beside those declared."""
     return [*(rows[0] if rows else ()), *(design.ranges if design is not None else ())]
 
 
@@ -173,7 +173,7 @@ _DIGITS = 6
 
 
 def sample(design: Design, seed: int) -> list[dict[str, Level]]:
-    """The value of each continuous factor at each point, in order."""
+    """Return the value of each continuous factor at each point, in order."""
     spans = design.ranges
     places = _places(design, len(spans), np.random.default_rng(derive_seed(seed, "design")))
     return [
@@ -183,7 +183,7 @@ def sample(design: Design, seed: int) -> list[dict[str, Level]]:
 
 
 def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
-    """Points in the unit cube `(points, axes)`.
+    """Return points in the unit cube `(points, axes)`.
 
     References:
         McKay, Beckman & Conover, Technometrics 21 (1979), 239-245.
@@ -212,7 +212,7 @@ _CELL = re.compile(r'("(?:[^"]|"")*"|[^,]*)(?:,|$)')
 
 
 def read_table(path: Path) -> Document:
-    """The rows of a CSV file, under the key `rows`, with the place of every level.
+    """Return the rows of a CSV file, under the key `rows`, with the place of every level.
 
     Levels are read as YAML would read them: `0.5` is a number, `true` is true, `null` is nothing.
 
@@ -246,7 +246,10 @@ def read_table(path: Path) -> Document:
 
 
 def _cells(path: Path, lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
-    """Number, text and cells of each line that is not blank; a cell does not go on to the next."""
+    """Yield Number, text and cells of each line that is not blank.
+
+    A cell does not go on to the next.
+    """
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue

@@ -62,7 +62,7 @@ class Bands(Config):
 
 
 def factors_of_repeats(study: Study) -> dict[str, tuple[Level, ...]]:
-    """Factors varied between and within repeats, in order; empty if none are declared."""
+    """Return factors varied between and within repeats, in order; empty if none are declared."""
     robustness = study.robustness
     answer = study.answer
     if robustness is None or answer is None or answer.over is None:
@@ -74,7 +74,10 @@ def factors_of_repeats(study: Study) -> dict[str, tuple[Level, ...]]:
 
 
 def settings_of_repeats(study: Study) -> dict[str, Level]:
-    """Levels of the factors that do not vary between repeats: those of the answer's panel."""
+    """Return levels of the factors that do not vary between repeats.
+
+    Those of the answer's panel.
+    """
     assert study.answer is not None
     answer = study.answer
     fixed = {
@@ -84,7 +87,7 @@ def settings_of_repeats(study: Study) -> dict[str, Level]:
 
 
 def parameter_sets(study: Study) -> list[Traits]:
-    """The traits of each set; of set 0, the usual one, none.
+    """Return the traits of each set; of set 0, the usual one, none.
 
     Raises:
         ConfigError: the bands cannot be read.
@@ -105,7 +108,7 @@ def parameter_sets(study: Study) -> list[Traits]:
 
 
 def latin_hypercube(points: int, axes: int, rng: np.random.Generator) -> Floats:
-    """Points in the unit cube `(points, axes)`: along each axis one in each of equal slices.
+    """Return points in the unit cube `(points, axes)`: along each axis one in each of equal slices.
 
     References:
         McKay, Beckman & Conover, Technometrics 21 (1979), 239-245.
@@ -115,19 +118,22 @@ def latin_hypercube(points: int, axes: int, rng: np.random.Generator) -> Floats:
 
 
 def _between(band: Range, share: float) -> float:
-    """Geometrically between the ends, since traits are log-normal."""
+    """Return a value geometrically between the ends, since traits are log-normal."""
     low, high = band
     value = low * (high / low) ** share
     return float(f"{value:.{_DIGITS}g}")
 
 
 def levels_of_cells(study: Study) -> Iterator[Row]:
-    """The level of every factor in every cell, in the order of the cells: last factor fastest."""
+    """Yield the level of every factor in every cell, in the order of the cells.
+
+    Last factor fastest.
+    """
     return _crossed(study, rows_of(study))
 
 
 def levels_at_ends(study: Study) -> Iterator[Row]:
-    """Levels with each range at either end, and the others at their middle.
+    """Return levels with each range at either end, and the others at their middle.
 
     Which points are drawn depends on the seed; whether the ends are valid does not.
     """
@@ -140,7 +146,7 @@ def _crossed(study: Study, rows: list[Row]) -> Iterator[Row]:
 
 
 def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
-    """Axes of the crossing: the listed rows, at their first factor, and each other factor."""
+    """Yield axes of the crossing: the listed rows, at their first factor, and each other factor."""
     in_rows = factors_in_rows(study)
     for factor, levels in study.factors.items():
         if factor not in in_rows:
@@ -151,7 +157,7 @@ def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
 
 
 def rows_of(study: Study) -> list[Row]:
-    """The rows of the study's design; none where all factors are crossed."""
+    """Return the rows of the study's design; none where all factors are crossed."""
     design = study.design
     if design is None:
         return []
@@ -176,7 +182,7 @@ def _ranges_of(study: Study) -> Mapping[str, ValueRange]:
 
 
 def size(study: Study) -> int:
-    """Number of cells in each part, without making them."""
+    """Return the number of cells in each part, without making them."""
     design = study.design
     in_rows = factors_in_rows(study)
     crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
@@ -188,7 +194,7 @@ def size(study: Study) -> int:
 
 
 def runs_of(study: Study) -> int:
-    """Maximum number of runs, without listing them."""
+    """Return the maximum number of runs, without listing them."""
     cells = size(study)
     trials = [part.replications or study.replications for part in study.parts.values()]
     has_reference = [part.reference is not None for part in study.parts.values()]
@@ -197,7 +203,7 @@ def runs_of(study: Study) -> int:
 
 
 def cells_of_repeats(study: Study) -> int:
-    """Number of cells in the repeats of the answer."""
+    """Return the number of cells in the repeats of the answer."""
     factors = factors_of_repeats(study)
     return math.prod(map(len, factors.values())) if factors else 0
 
@@ -210,7 +216,7 @@ def _runs_of_repeats(study: Study) -> int:
 
 
 def factors_in_rows(study: Study) -> set[str]:
-    """The factors whose levels stand in rows, and so do not cross each other."""
+    """Return the factors whose levels stand in rows, and so do not cross each other."""
     design = study.design
     if design is not None and design.zip is not None:
         return set(design.zip)
@@ -219,7 +225,7 @@ def factors_in_rows(study: Study) -> set[str]:
 
 
 def path_in_design(study: Study, key: str, value: Any) -> KeyPath | None:
-    """Path of the design's key with that value; None if absent."""
+    """Return the path of the design's key with that value; None if absent."""
     if study.design is not None and key in study.design.ranges:
         return "design", "ranges", key
     for index, row in enumerate(study.listed_rows):

@@ -83,7 +83,10 @@ KINDS: Final = (
 
 
 def recognise(document: Document, kinds: Sequence[FileKind] = KINDS) -> FileKind | None:
-    """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
+    """Return the kind that knows most of the keys.
+
+    Among equals, the one whose folder it lies in.
+    """
     keys = document.data.keys() - {"description"}
     model = document.data.get("model")
     named = {each.scenario: name for name, each in MODELS.items() if name != "full"}
@@ -106,7 +109,7 @@ def open_study(
     version: Version | None = None,
     pilot: int | None = None,
 ) -> Study:
-    """`load_study`, which tells of a file of another kind what it is.
+    """Return `load_study`, which tells of a file of another kind what it is.
 
     Raises:
         ConfigError: not found, not a study, not valid, or changes that make no sense.
@@ -121,7 +124,7 @@ def open_study(
 
 
 def opened(load: Callable[[], Document]) -> Document | None:
-    """A document; None if it cannot be read."""
+    """Return a document; None if it cannot be read."""
     try:
         return load()
     except ConfigError:
@@ -129,7 +132,9 @@ def opened(load: Callable[[], Document]) -> Document | None:
 
 
 def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError | None:
-    """Error for a file of another kind than a command takes; None if it fits or is unknown.
+    """Return the error for a file of another kind than a command takes.
+
+    None if it fits or is unknown.
 
     Args:
         document: The file.

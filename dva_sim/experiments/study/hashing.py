@@ -23,18 +23,18 @@ from dva_sim.kernel.yaml_files import file_in, texts_in, with_named_files
 
 
 def stable_hash(data: Any) -> str:
-    """64 bits that depend on the data alone, not on the machine or the order of keys."""
+    """Return 64 bits that depend on the data alone, not on the machine or the order of keys."""
     return digest(data)[:16]
 
 
 def digest(data: Any) -> str:
-    """All 256 bits of the same."""
+    """Return all 256 bits of the same."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str, str]:
-    """Hashes of the files that scenarios name (maps, traces), and that these name.
+    """Return hashes of the files that scenarios name (maps, traces), and that these name.
 
     Args:
         scenarios: Scenarios of the runs.
@@ -44,7 +44,7 @@ def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str,
 
 
 def input_names(scenarios: Iterable[Config], others: Iterable[str] = ()) -> list[str]:
-    """Texts of scenarios, and others, that may name files; see `inputs`."""
+    """Return texts of scenarios, and others, that may name files; see `inputs`."""
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
     return sorted({*others, *(text for dump in dumps for text in texts_in(dump) if "." in text)})
 
@@ -63,7 +63,10 @@ def files_of(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
 
 
 def _files_of(name: str) -> Iterator[tuple[str, Path]]:
-    """The file of a name, which may be a shipped trace, and those that it names: a map's image."""
+    """Yield the file of a name, which may be a shipped trace, and those that it names.
+
+    A map's image.
+    """
     path = Path(file_in(name))
     shipped = (root / _TRACES / path for root in resources.roots())
     found = next(filter(resources.is_file, (path, *shipped)), None)
@@ -103,18 +106,21 @@ _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 
 
 def fingerprint() -> str:
-    """64 bits over the simulating code and every profile, site and schema within reach."""
+    """Return 64 bits over the simulating code and every profile, site and schema within reach."""
     return _hash_of((*_simulating_code(), *_digests(edited_files())))
 
 
 @cache
 def _simulating_code() -> tuple[tuple[str, bytes], ...]:
-    """Digests of the program at the first call; later changes of its files are not loaded."""
+    """Return digests of the program at the first call.
+
+    Later changes of its files are not loaded.
+    """
     return tuple(_digests(_code(_CODE)))
 
 
 def fingerprint_of_judges() -> str:
-    """64 bits over the code that comes from tables of runs to verdicts."""
+    """Return 64 bits over the code that comes from tables of runs to verdicts."""
     return _hash_of(_digests(_code(_JUDGES)))
 
 
@@ -141,7 +147,7 @@ def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
 
 
 def edited_files() -> Iterator[tuple[str, Path]]:
-    """Profiles, sites and schemas within reach: each name once, from the nearest folder.
+    """Yield profiles, sites and schemas within reach: each name once, from the nearest folder.
 
     No run reads pictures.
     """
@@ -166,7 +172,7 @@ def folders_of_files() -> Iterator[Path]:
 
 @cache
 def program_state() -> dict[str, str | bool | None]:
-    """State of the running program at the first call; see `state_of`."""
+    """Return the state of the running program at the first call; see `state_of`."""
     return state_of(Path(dva_sim.__file__).parent)
 
 
@@ -188,7 +194,7 @@ def state_of(package: Path) -> dict[str, str | bool | None]:
 
 
 def _git(folder: Path, *words: str) -> str | None:
-    """Output of a git command; None if it fails."""
+    """Return the output of a git command; None if it fails."""
     # A hook that started us names its own repository in the environment.
     environment = {k: v for k, v in os.environ.items() if not k.startswith("GIT_")}
     try:

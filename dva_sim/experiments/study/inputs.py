@@ -19,7 +19,7 @@ from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, r
 
 
 def own_measures(study: Study) -> dict[str, RunMeasure]:
-    """The measures that a study brings itself, by names that hold in any process.
+    """Return the measures that a study brings itself, by names that hold in any process.
 
     Raises:
         ConfigError: one cannot be had, or has the name of another column.
@@ -89,5 +89,5 @@ class StudyInputs:
         return own_measures(self.study)
 
     def measures_of(self, model: str) -> list[str]:
-        """Names of its own measures that can be taken of the runs of a model."""
+        """Return names of its own measures that can be taken of the runs of a model."""
         return [each.about.name for each in self.measures.values() if reads(each, model)]

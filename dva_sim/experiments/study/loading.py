@@ -48,7 +48,7 @@ class Changed:
     touched: tuple[KeyPath, ...]
 
     def holds(self, path: KeyPath) -> bool:
-        """True if the value at `path` is unchanged."""
+        """Return True if the value at `path` is unchanged."""
         return not any(path[: len(t)] == t for t in self.touched)
 
 
@@ -118,14 +118,17 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
 
 
 def _bare(kind: Any) -> Any:
-    """A type without what may be said of it besides, and without its None."""
+    """Return a type without what may be said of it besides, and without its None."""
     while get_origin(kind) in (Annotated, Union, UnionType):
         kind = get_args(kind)[0]
     return kind
 
 
 def _entry(there: Mapping[str, Any], key: str) -> str:
-    """The name in a mapping that a dotted key begins with; the whole key may be a new name."""
+    """Return the name in a mapping that a dotted key begins with.
+
+    The whole key may be a new name.
+    """
     names = [name for name in there if key == name or key.startswith(f"{name}.")]
     if not names and "." in key:
         first = key.partition(".")[0]
@@ -145,7 +148,7 @@ Settings = Mapping[str, Any] | Iterable[str]
 
 
 def pairs_of(settings: Settings, seed: int | None = None) -> list[str]:
-    """Settings, and the seed if one is given, as on the command line.
+    """Return settings, and the seed if one is given, as on the command line.
 
     Raises:
         ConfigError: a value that no file could hold.
@@ -157,7 +160,7 @@ def pairs_of(settings: Settings, seed: int | None = None) -> list[str]:
 
 
 def _as_text(key: str, value: Any) -> str:
-    """A value as YAML: words as they are where that is possible, all else as JSON."""
+    """Return a value as YAML: words as they are where that is possible, all else as JSON."""
     if isinstance(value, str | Path) and parse_scalar(str(value)) == str(value):
         return str(value)
     try:
@@ -167,7 +170,7 @@ def _as_text(key: str, value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers and arrays of numpy, and paths, as JSON can hold them."""
+    """Return numbers and arrays of numpy, and paths, as JSON can hold them."""
     if isinstance(value, Path):
         return str(value)
     if hasattr(value, "tolist"):
@@ -238,7 +241,7 @@ def load_study(
 
 
 def _in_version(document: Document, version: Version | None) -> tuple[Study, Changed]:
-    """The study as its file says, or one of its versions; all of them are judged."""
+    """Return the study as its file says, or one of its versions; all of them are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
     factors = {name: list(levels) for name, levels in study.factors.items()}
@@ -257,7 +260,10 @@ def _in_version(document: Document, version: Version | None) -> tuple[Study, Cha
 def _version_of(
     study: Study, written: Changed, document: Document, version: Version
 ) -> tuple[Study, Changed]:
-    """A version, and its keys; claims about what the small version leaves out are left out."""
+    """Return a version, and its keys.
+
+    Claims about what the small version leaves out are left out.
+    """
     try:
         data = change(written, getattr(study, version), Study, _scenarios_of(written, document))
         made = _built(data, document, may_lose=version == "quick")
@@ -283,7 +289,7 @@ def _is_answered(study: Study, data: Changed) -> bool:
 
 
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
-    """The study changed by `--set`; claims about levels that are gone are gone, too."""
+    """Return the study changed by `--set`; claims about levels that are gone are gone, too."""
     changes = parse_changes(settings)
     scenarios = _scenarios_of(data, document)
 
@@ -299,7 +305,7 @@ def _with_settings(data: Changed, document: Document, settings: tuple[str, ...])
 
 
 def _scenarios_of(data: Changed, document: Document) -> list[type[Config]]:
-    """The kinds of scenarios that the parts have; all kinds where one cannot be read."""
+    """Return the kinds of scenarios that the parts have; all kinds where one cannot be read."""
     try:
         named = [part["scenario"] for part in data.data["parts"].values()]
         files = [load_scenario(name, base=document.file.parent) for name in named]
@@ -321,7 +327,7 @@ def _piloted(study: Study, persons: int) -> Study:
 
 
 def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
-    """The study, if it makes sense.
+    """Return the study, if it makes sense.
 
     Args:
         data: Its keys.
@@ -353,7 +359,7 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
 
 
 def _table_of(study: Study) -> Document | None:
-    """The rows of the file that the design names; None if it names none."""
+    """Return the rows of the file that the design names; None if it names none."""
     if study.design is None or study.design.csv is None:
         return None
     try:

@@ -27,7 +27,7 @@ _COUNTS: Final = {
 
 
 def placed_mistake(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
-    """A mistake in a scenario with its place: see `mistakes_of`."""
+    """Return a mistake in a scenario with its place: see `mistakes_of`."""
     if error.file is not None and not error.keys:
         return _of_other_kind(error, name) or error
     return _placed(error, name, pairs, seed)
@@ -41,7 +41,7 @@ def _of_other_kind(error: ConfigError, name: str) -> ConfigError | None:
 
 
 def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
-    """A mistake that has no place yet, if it is one of the scenario."""
+    """Return a mistake that has no place yet, if it is one of the scenario."""
     document = opened(lambda: scenarios.load(name))
     if document is None:
         return error
@@ -71,7 +71,7 @@ def blamed_in(document: Document, error: ConfigError) -> ConfigError:
 
 
 def _quoted(document: Document, problem: str) -> KeyPath:
-    """The deepest key whose value the problem quotes."""
+    """Return the deepest key whose value the problem quotes."""
     for path in sorted(document.places, key=len, reverse=True):
         value: Any = document.data
         for step in path:

@@ -59,12 +59,12 @@ def says(*keys: str, not_: str = "") -> dict[str, Any]:
 
 
 def multiplied(covariate: str) -> list[str]:
-    """The columns whose product a covariate is: `caution_off * way_off_m`, or one alone."""
+    """Return the columns whose product a covariate is: `caution_off * way_off_m`, or one alone."""
     return [name.strip() for name in covariate.split("*")]
 
 
 def refuse_keys_of_the_design(keys: Keys) -> Keys:
-    """Persons are the study's own to choose.
+    """Return the persons, which are the study's own to choose.
 
     Raises:
         ValueError: a key that the study sets itself.
@@ -217,7 +217,7 @@ class StopRule(Config):
         return self.batch_persons == "double"
 
     def looks(self, persons: int) -> list[int]:
-        """Numbers of persons after which the intervals are looked at, ascending.
+        """Return numbers of persons after which the intervals are looked at, ascending.
 
         Args:
             persons: The first batch.
@@ -229,7 +229,7 @@ class StopRule(Config):
         return [*itertools.takewhile(lambda count: count < most, doubled), most]
 
     def level(self, persons: int) -> float:
-        """Confidence level of the interval of one look; see `looks`."""
+        """Return the confidence level of the interval of one look; see `looks`."""
         shared_by = len(self.looks(persons)) if self.is_scheduled else 1
         return 1 - (1 - LEVEL) / shared_by
 

@@ -50,7 +50,7 @@ class StudyPlan:
 
     @classmethod
     def of(cls, asked: Study | StudyPlan) -> StudyPlan:
-        """The plan of a study; a plan is its own.
+        """Return the plan of a study; a plan is its own.
 
         Raises:
             ConfigError: a file that cannot be read, or a cell that is not valid.

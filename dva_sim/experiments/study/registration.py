@@ -71,7 +71,7 @@ class Preregistration(Config):
 
 
 def load_registration(document: Document) -> Preregistration:
-    """The registration that a file holds.
+    """Return the registration that a file holds.
 
     Raises:
         ConfigError: it holds none.
@@ -80,7 +80,7 @@ def load_registration(document: Document) -> Preregistration:
 
 
 def registration_of(study: Study) -> Preregistration | None:
-    """The registration beside a study; None where there is none.
+    """Return the registration beside a study; None where there is none.
 
     Raises:
         ConfigError: the file there holds none.
@@ -145,7 +145,7 @@ def _write(path: Path, text: str, replaces: bool) -> None:
 
 
 def plan_of(study: Study) -> dict[str, Any]:
-    """All that fixes a confirmatory run, but for its seed, as JSON would hold it."""
+    """Return all that fixes a confirmatory run, but for its seed, as JSON would hold it."""
     nobody = study.model_copy(update={"seed": _ANY_SEED})
     files_read = StudyInputs(nobody)
     cells = cell_grid.cells(nobody, files_read)
@@ -169,7 +169,7 @@ def plan_of(study: Study) -> dict[str, Any]:
 
 
 def settled(study: Study) -> Study:
-    """The study with its status; run as registered, it has the seed of the registration.
+    """Return the study with its status; run as registered, it has the seed of the registration.
 
     Raises:
         ConfigError: the registration cannot be read, or the study has a cell that is not valid.
@@ -201,7 +201,7 @@ def _liberties(study: Study) -> Iterator[str]:
 
 
 def departures(found: Preregistration, study: Study) -> Iterator[str]:
-    """In what a study is not what was registered."""
+    """Yield in what a study is not what was registered."""
     if found.hash != found.proper_hash:
         yield "the registration was edited: its hash is not that of what it fixes"
     now = plan_of(study)
@@ -228,7 +228,7 @@ def _remarks(found: Preregistration, study: Study) -> Iterator[str]:
 
 
 def _hash_of(scenario: Config, files: Mapping[str, str]) -> str:
-    """Files count by name and content, wherever they lie."""
+    """Return files count by name and content, wherever they lie."""
     return stable_hash(_portable(scenario.model_dump(mode="json"), files))
 
 
@@ -241,7 +241,7 @@ def _portable(data: Any, files: Mapping[str, str]) -> Any:
 
 
 def _as_text(made: Preregistration) -> str:
-    """YAML with a key of the plan on each line, so that a difference is seen as one."""
+    """Return the YAML with a key of the plan on each line, so that a difference is seen as one."""
     data = made.model_dump(mode="json")
     plan = data.pop("plan")
     lines = [

@@ -30,7 +30,7 @@ _WIDE = 3.0  # from this ratio of its ends on, a band is divided by equal ratios
 
 
 def rule_of(study: Study) -> tuple[ScreeningRule, Contrast]:
-    """Screening rule of a study, and its answer.
+    """Return the screening rule of a study, and its answer.
 
     Raises:
         ConfigError: it has no screening, or nothing to screen.
@@ -42,7 +42,9 @@ def rule_of(study: Study) -> tuple[ScreeningRule, Contrast]:
 
 
 def screened(study: Study) -> list[Assumption]:
-    """The assumed numbers that are varied: all that the patterns name and the study does not set.
+    """Return the assumed numbers that are varied.
+
+    All that the patterns name and the study does not set.
 
     Raises:
         ConfigError: a pattern names none.
@@ -61,14 +63,14 @@ def screened(study: Study) -> list[Assumption]:
 
 
 def walks_of(study: Study) -> Floats:
-    """The trajectories `(count, numbers + 1, numbers)` in the unit cube."""
+    """Return the trajectories `(count, numbers + 1, numbers)` in the unit cube."""
     rule, _ = rule_of(study)
     rng = Streams(rule.seed).fresh("screening")
     return trajectories(len(screened(study)), rule.trajectories, rng)
 
 
 def screening_study(study: Study) -> Study:
-    """The study of all points, with persons and random numbers of its own.
+    """Return the study of all points, with persons and random numbers of its own.
 
     Raises:
         ConfigError: see `rule_of` and `screened`.
@@ -117,7 +119,7 @@ class KeptEffect(NamedTuple):
 
 
 def kept_effects(most: int) -> list[KeptEffect]:
-    """The largest effects on the main study's answer; none if it was not screened."""
+    """Return the largest effects on the main study's answer; none if it was not screened."""
     path = resources.available(KEPT, "*.csv").get(MAIN)
     if path is None:
         return []
@@ -130,7 +132,7 @@ def kept_effects(most: int) -> list[KeptEffect]:
 
 
 def folder_of_screening(name: str) -> Path:
-    """Default results folder of a screening."""
+    """Return the default results folder of a screening."""
     return Path("results") / f"{Path(name).stem}-screening"
 
 

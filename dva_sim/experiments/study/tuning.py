@@ -77,7 +77,7 @@ class TuningBasis(Config):
         )
 
     def unlike(self, other: TuningBasis) -> list[str]:
-        """Names of the entries that differ."""
+        """Return names of the entries that differ."""
         ours = self.model_dump()
         theirs = other.model_dump()
         return [name for name in ours if ours[name] != theirs[name]]
@@ -103,12 +103,12 @@ class TunedValues(Config):
     seen: tuple[TriedValue, ...]
 
     def remark(self, now: TuningBasis) -> str:
-        """Remark that persons or phones have changed since the tuning; empty if not."""
+        """Return the remark that persons or phones have changed since the tuning; empty if not."""
         others = " and ".join(self.basis.unlike(now))
         return f"tuned with other {others}: run 'dva-sim tune {self.study}' again" if others else ""
 
     def value_for(self, levels: Mapping[str, Level]) -> float:
-        """The value chosen for the cell with these levels.
+        """Return the value chosen for the cell with these levels.
 
         Raises:
             ConfigError: it was not tuned for them.
@@ -122,22 +122,22 @@ class TunedValues(Config):
 
 
 def choose(means: Mapping[float, float]) -> float:
-    """The rule: the value with the least mean; of equal ones the nearest to 1, by ratio."""
+    """Return the rule: the value with the least mean; of equal ones the nearest to 1, by ratio."""
     return min(means, key=lambda value: (means[value], abs(math.log(value)), value))
 
 
 def file_of(study: Study) -> Path:
-    """File of a study's tuned values."""
+    """Return the file of a study's tuned values."""
     return study.folder / FOLDER / f"{study.file.stem}.yaml"
 
 
 def folder_of_tuning(name: str) -> Path:
-    """Default folder for the trials of a tuning."""
+    """Return the default folder for the trials of a tuning."""
     return Path("results") / f"{Path(name).stem}-tuning"
 
 
 def load_tuned(study: Study) -> TunedValues:
-    """The tuned values of a study.
+    """Return the tuned values of a study.
 
     Raises:
         ConfigError: there are none, or they were made by another rule.
@@ -172,7 +172,10 @@ def save_tuned(study: Study, tuned: TunedValues) -> Path:
 
 
 def _hash_of(files: Iterable[Path]) -> str:
-    """64 bits over names and values; what describes a file, or comments on it, is none of them."""
+    """Return 64 bits over names and values.
+
+    What describes a file, or comments on it, is none of them.
+    """
     data = [[path.name, {**load_yaml(path).data, "description": ""}] for path in files]
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -182,7 +185,7 @@ def _how_to_make(name: str) -> str:
 
 
 def tuning_study(study: Study) -> Study:
-    """Study that tries every value with persons and seeds of its own, on equal budgets.
+    """Return the study that tries every value with persons and seeds of its own, on equal budgets.
 
     Raises:
         ConfigError: the study tunes nothing.
@@ -198,7 +201,7 @@ def tuning_study(study: Study) -> Study:
 def trials_of(
     study: Study, key: str, rule: Tuning | ScreeningRule, part: str, **changes: Any
 ) -> Study:
-    """Runs of one part of a study alone, with persons and random numbers of its own.
+    """Return runs of one part of a study alone, with persons and random numbers of its own.
 
     Args:
         study: Study to derive from; everything is kept except for the keys in `LEFT`.
@@ -230,7 +233,7 @@ def trials_of(
 
 
 def rule_of(study: Study) -> Tuning:
-    """The rule by which a study tunes.
+    """Return the rule by which a study tunes.
 
     Raises:
         ConfigError: it tunes nothing.

@@ -34,7 +34,7 @@ Problem = tuple[str, KeyPath]
 
 
 def of_design(study: Study) -> Iterator[Problem]:
-    """Rows that do not fit together, and factors that are there twice."""
+    """Yield rows that do not fit together, and factors that are there twice."""
     design = study.design
     for name in (POINT,) if POINT in study.factors else ():
         yield f"{name!r} numbers the rows of a design; call the factor otherwise", ("factors", name)
@@ -115,7 +115,7 @@ def of_factors(study: Study) -> Iterator[Problem]:
 
 
 def _nests(key: str, other: str) -> bool:
-    """True if one dotted key is a part of what the other names."""
+    """Return True if one dotted key is a part of what the other names."""
     short, long = sorted((key, other), key=len)
     return long.startswith(f"{short}.")
 
@@ -130,7 +130,7 @@ def _faults_of_numbers(study: Study, factor: str, levels: Sequence[Level]) -> It
 
 
 def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
-    """A treatment is a column of every table, so no other column is called so."""
+    """Yield treatments named like another column: each is a column of every table."""
     if factor in DESIGN or factor in measured_names() or factor == TUNING:
         what = "the design" if factor in DESIGN else "what is measured"
         what = "the tuning" if factor == TUNING else f"a column of {what}"
@@ -138,7 +138,7 @@ def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
 
 
 def of_size(study: Study) -> Iterator[Problem]:
-    """A slip in a grid, or in how many persons there are, would take years to run."""
+    """Yield a slip in a grid, or in how many persons there are, would take years to run."""
     count = size(study)
     has_points = POINT in study.factors
     most = MOST_POINTS if has_points else MOST_CELLS
@@ -156,7 +156,7 @@ def of_size(study: Study) -> Iterator[Problem]:
 
 
 def _levels_of(study: Study, factor: str) -> Sequence[Level]:
-    """The levels of a factor, declared or in rows; none for a range."""
+    """Return the levels of a factor, declared or in rows; none for a range."""
     listed = [row[factor] for row in study.listed_rows if factor in row]
     return study.factors.get(factor, tuple(listed))
 
@@ -184,7 +184,7 @@ def _faults_of_tuning(study: Study) -> Iterator[Problem]:
 
 
 def of_claims(study: Study) -> Iterator[Problem]:
-    """Problems of declarations about factors and levels that the study lacks."""
+    """Yield problems of declarations about factors and levels that the study lacks."""
     yield from of_answer(study)
     yield from of_robustness(study)
     yield from of_map(study)
@@ -203,7 +203,7 @@ def of_claims(study: Study) -> Iterator[Problem]:
 
 
 def kept_claims(study: Study) -> Study:
-    """The study without what was declared about parts, factors or levels that are gone.
+    """Return the study without what was declared about parts, factors or levels that are gone.
 
     An answer without its levels takes the two that its factor has left, if it has two. Predictions
     stay; each is reported as not run.
@@ -256,7 +256,7 @@ def _of_answer_as_declared(study: Study) -> Iterator[Prediction]:
 
 
 def _kept_map(study: Study) -> MapRule | None:
-    """The map without what it notes about levels that are gone."""
+    """Return the map without what it notes about levels that are gone."""
     if study.map is None:
         return None
     gone = {path[-1] for _, path in of_map(study) if path[:2] == ("map", "notes")}
@@ -266,7 +266,7 @@ def _kept_map(study: Study) -> MapRule | None:
 
 
 def lost_claims(study: Study) -> list[str]:
-    """Claims that the changed factors or levels no longer allow, one sentence each."""
+    """Return claims that the changed factors or levels no longer allow, one sentence each."""
     kept = kept_claims(study)
     lost = [f"{_fate_of_answer(kept)}: {problem}" for problem, _ in of_answer(study)][:1]
     for what, declared, left in (
@@ -287,7 +287,7 @@ def _fate_of_answer(kept: Study) -> str:
 
 
 def of_answer(study: Study) -> Iterator[Problem]:
-    """Reasons why the declared contrast cannot be computed."""
+    """Yield reasons why the declared contrast cannot be computed."""
     if study.answer is not None:
         yield from _faults_of_contrast(study, study.answer, (ANSWER,))
 
@@ -323,7 +323,7 @@ def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
 
 
 def of_stop(study: Study) -> Iterator[Problem]:
-    """Reasons why a stopping rule cannot be applied."""
+    """Yield reasons why a stopping rule cannot be applied."""
     stop = study.stop
     if stop is None:
         return
@@ -352,7 +352,7 @@ def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -
 
 
 def of_robustness(study: Study) -> Iterator[Problem]:
-    """Reasons why the contrast cannot be repeated."""
+    """Yield reasons why the contrast cannot be repeated."""
     robustness = study.robustness
     if robustness is None:
         return

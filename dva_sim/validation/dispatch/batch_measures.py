@@ -100,7 +100,7 @@ class Sample:
 
 
 def occupied(starts: Floats, ends: Floats, edges: Floats) -> Floats:
-    """Total length of the intervals within each window [s].
+    """Return the total length of the intervals within each window [s].
 
     Args:
         starts: Starts of the intervals `(n,)`.
@@ -115,7 +115,7 @@ def occupied(starts: Floats, ends: Floats, edges: Floats) -> Floats:
 
 
 def _since(moments: Floats, times: Floats) -> Floats:
-    """Total age of all earlier moments at each time [s]."""
+    """Return the total age of all earlier moments at each time [s]."""
     ordered = np.sort(moments)
     ordered = ordered[np.isfinite(ordered)]
     upto = np.concatenate([[0.0], np.cumsum(ordered)])
@@ -181,7 +181,7 @@ def _busy_times(
 
 
 def many_servers(times: Floats, services: Floats, servers: int) -> Floats:
-    """Waits at several servers, first come first served.
+    """Return waits at several servers, first come first served.
 
     Args:
         times: Arrival times, ascending `(n,)`.
@@ -201,7 +201,7 @@ def many_servers(times: Floats, services: Floats, servers: int) -> Floats:
 
 
 def one_server(times: Floats, services: Floats, ranks: Ints) -> Floats:
-    """Waits at one server that goes by rank, and within a rank by who came first.
+    """Return waits at one server that goes by rank, and within a rank by who came first.
 
     Args:
         times: Arrival times, ascending `(n,)`.
@@ -257,7 +257,7 @@ class Batches:
         return np.asarray(sums, dtype=np.float64)
 
     def count(self, which: NDArray[np.bool_]) -> Floats:
-        """Number of selected events in each batch."""
+        """Return the number of selected events in each batch."""
         return self.total(np.ones(len(which)), which)
 
 
@@ -265,7 +265,7 @@ Events = NDArray[np.bool_]
 
 
 def sums(name: str, batches: Batches) -> Sums:
-    """Tops and bottoms of a measure."""
+    """Return tops and bottoms of a measure."""
     word, stroke, detail = name.partition("/")
     if stroke:
         return _DETAILED[word](batches, detail)
@@ -325,7 +325,7 @@ def _known(word: str, known: list[str], what: str) -> None:
 
 # --- of each event ---------------------------------------------------------------------
 def _between(first: str, second: str) -> Callable[[Sample], tuple[Floats, Events]]:
-    """The time from one step to another, of the events served."""
+    """Return the time from one step to another, of the events served."""
 
     def values(sample: Sample) -> tuple[Floats, Events]:
         return getattr(sample, second) - getattr(sample, first), sample.served
@@ -334,7 +334,7 @@ def _between(first: str, second: str) -> Callable[[Sample], tuple[Floats, Events
 
 
 def _wait_of_all(sample: Sample) -> tuple[Floats, Events]:
-    """The wait for somebody, or until nobody was needed any more."""
+    """Return the wait for somebody, or until nobody was needed any more."""
     gone = np.where(np.isnan(sample.assigned), sample.closed, sample.assigned)
     return gone - sample.detected, np.ones(len(gone), dtype=bool)
 
@@ -392,13 +392,13 @@ def _open(batches: Batches) -> Sums:
 
 
 def _resting(batches: Batches) -> Sums:
-    """Number of finite sources without an open event."""
+    """Return the number of finite sources without an open event."""
     area, lengths = _open(batches)
     return batches.sample.sources * lengths - area, lengths
 
 
 def _total(batches: Batches) -> Sums:
-    """Ways to all events that were detected at one moment, added up."""
+    """Return ways to all events that were detected at one moment, added up."""
     sample = batches.sample
     first = np.diff(sample.detected, prepend=-np.inf) > 0
     return batches.total(sample.arrived - sample.assigned, sample.served), batches.count(first)
@@ -431,7 +431,7 @@ def _group(batches: Batches, group: str) -> Sums:
 
 
 def _share(batches: Batches, detail: str) -> Sums:
-    """Share of served events that are of one stream and were served by one unit."""
+    """Return the share of served events that are of one stream and were served by one unit."""
     sample = batches.sample
     unit, _, stream = detail.partition("/")
     which = sample.unit == sample.units.index(unit)

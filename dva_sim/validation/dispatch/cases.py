@@ -36,7 +36,7 @@ _LAWS = tuple(
 def exact_values(
     name: str | None, parameters: Mapping[str, Any], scenario: TimedScenario
 ) -> tuple[Measures, str]:
-    """Exact values of a scenario by a formula, and the formula's source.
+    """Return the exact values of a scenario by a formula, and the formula's source.
 
     Args:
         name: The formula's; None gives nothing.
@@ -73,7 +73,7 @@ def exact_values(
 
 
 def _resolved(value: Any, scenario: TimedScenario) -> Any:
-    """The value with its references replaced by what they point to."""
+    """Return the value with its references replaced by what they point to."""
     if isinstance(value, list):
         return [_resolved(item, scenario) for item in value]
     if isinstance(value, str) and value.startswith("$"):
@@ -100,7 +100,7 @@ def _inside(node: Any, step: str) -> Any:
 
 
 def _item(items: tuple[Any, ...], step: str) -> Any:
-    """An item by its number from 0, or by its name or kind."""
+    """Return an item by its number from 0, or by its name or kind."""
     if step.isdigit():
         return items[int(step)] if int(step) < len(items) else None
     named = (i for i in items if (getattr(i, "name", "") or getattr(i, "kind", "")) == step)
@@ -108,7 +108,7 @@ def _item(items: tuple[Any, ...], step: str) -> Any:
 
 
 def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
-    """The value as the parameter wants it: a law, its mean, or its rate."""
+    """Return the value as the parameter wants it: a law, its mean, or its rate."""
     if key == "preferences" and isinstance(value, dict):
         return _preferences(value, scenario)
     if isinstance(value, list):
@@ -128,14 +128,14 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
 
 
 def _checked(key: str, hint: Any, value: Any, original: Any) -> Any:
-    """A parameter, if it is of the kind that the formula wants."""
+    """Return a parameter, if it is of the kind that the formula wants."""
     if _wants_law(hint):
         return value
     return _valid(TypeAdapter(hint), value, f"{key} {original!r} does not fit")
 
 
 def _valid(adapter: TypeAdapter[A], value: Any, wrong: str) -> A:
-    """The value as an annotation wants it; else what is wrong, and the first reason."""
+    """Return the value as an annotation wants it; else what is wrong, and the first reason."""
     try:
         return adapter.validate_python(value)
     except ValidationError as error:
@@ -148,12 +148,12 @@ def _wants_law(hint: Any) -> bool:
 
 
 def _mentions(hint: Any, test: Any) -> bool:
-    """True if an annotation, or one inside it, passes a test."""
+    """Return True if an annotation, or one inside it, passes a test."""
     return bool(test(hint)) or any(_mentions(inner, test) for inner in get_args(hint))
 
 
 def _preferences(lists: dict[str, Any], scenario: TimedScenario) -> list[list[int]]:
-    """For each stream the list of its zone, its units counted from 1."""
+    """Return for each stream the list of its zone, its units counted from 1."""
     orders = []
     for stream in scenario.demand:
         if len(stream.zones) != 1:
@@ -204,7 +204,7 @@ class CaseConfig(Config):
     )
     @classmethod
     def _same_names(cls, value: Any) -> Any:
-        """A list compares each measure with the exact value of the same name."""
+        """Return a list compares each measure with the exact value of the same name."""
         return {name: name for name in value} if isinstance(value, list | tuple) else value
 
 
@@ -242,7 +242,7 @@ class Case(Config):
 
 
 def load_cases(name: str | Path = SHIPPED) -> list[Case]:
-    """The cases of a file, with their exact values.
+    """Return the cases of a file, with their exact values.
 
     Args:
         name: A path, or the name of a file in `experiments/validation`.
@@ -278,7 +278,7 @@ def _case(name: str, config: CaseConfig, document: Document) -> Case:
 
 
 def _exact(config: CaseConfig, scenario: TimedScenario) -> tuple[dict[str, float], str]:
-    """The exact value of each measure, and the formula's sources."""
+    """Return the exact value of each measure, and the formula's sources."""
     known, source = exact_values(config.formula, config.parameters, scenario)
     exact = {}
     for measure, answer in (config.measures | config.loosely).items():

@@ -87,7 +87,7 @@ def check_cases(
 
 
 def play(job: StudyJob) -> Tables:
-    """One run: tops and bottoms of each measure, and the controls, one row per batch."""
+    """Return one run: tops and bottoms of each measure, and the controls, one row per batch."""
     scenario = cast(TimedScenario, job.scenario)
     asked = job.levels
     sample = sample_of(simulate_timed(scenario, job.seed))
@@ -129,7 +129,7 @@ def check_identities(seed: int, progress: Progress = lambda done: None) -> list[
 
 
 def runs_of(cases: Sequence[Case], quick: bool) -> int:
-    """Number of runs needed to check all cases."""
+    """Return the number of runs needed to check all cases."""
     return sum(_runs(case, quick) for case in cases)
 
 
@@ -147,7 +147,9 @@ def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
 
 
 def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]]:
-    """Number waiting and in service: integrated by the model, and from the events' times.
+    """Return the number waiting and in service.
+
+    Integrated by the model, and from the events' times.
 
     The first follows what happens as it happens, the second is who came and went when. Their
     ratio is 1 in every run, not only on average: Little's law, path by path.
@@ -166,13 +168,16 @@ def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]
 
 
 def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns:
-    """The batches of all runs of a case, run after run."""
+    """Return the batches of all runs of a case, run after run."""
     found = [row for job in jobs for row in rows[job.key]]
     return {name: np.array([row[name] for row in found], dtype=float) for name in found[0]}
 
 
 def _compare(case: Case, columns: Columns) -> list[Evidence]:
-    """All that a case is judged by: results, what was put in, and what must hold in any case."""
+    """Return all that a case is judged by.
+
+    Results, what was put in, and what must hold in any case.
+    """
     known = [values for name, values in columns.items() if name.startswith("control ")]
     controls = np.column_stack(known) if known else None
     found = [
@@ -237,7 +242,7 @@ def _line(
 def evidence(
     lines: Sequence[Evidence], conditions: Mapping[str, str], quick: bool
 ) -> ValidationResult:
-    """Result of all checks: all must agree, and of a full run none may be too rough.
+    """Return the result of all checks: all must agree, and of a full run none may be too rough.
 
     Args:
         lines: The checks.

@@ -76,7 +76,7 @@ class Estimate:
 
 
 def estimate(tops: Floats, bottoms: Floats, controls: Floats | None = None) -> Estimate:
-    """The ratio of two sums over batches.
+    """Return the ratio of two sums over batches.
 
     Args:
         tops: Such as the sum of waits in each batch `(n,)`.
@@ -94,12 +94,12 @@ def estimate(tops: Floats, bottoms: Floats, controls: Floats | None = None) -> E
 
 
 def certain(value: float) -> Estimate:
-    """A value that nothing is left to chance in."""
+    """Return a value that nothing is left to chance in."""
     return Estimate(float(value), 0.0, plain=float(value), plain_error=0.0, batches=1)
 
 
 def adjusted(values: Floats, controls: Floats) -> Floats:
-    """The values without what the controls explain, by weights from other batches.
+    """Return the values without what the controls explain, by weights from other batches.
 
     Args:
         values: One per batch `(n,)`.
@@ -143,7 +143,7 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
 
 
 def half_band(error: float, exact: float, batches: int) -> float:
-    """Distance from the exact value up to which an estimate agrees.
+    """Return the distance from the exact value up to which an estimate agrees.
 
     It is 3 standard errors (as many more as Student's t asks for with few batches) or 0.5 %,
     whichever is more.
@@ -162,7 +162,7 @@ def _rounding(exact: float) -> float:
 
 @cache
 def _errors_allowed(batches: int) -> float:
-    """Standard errors that a right estimate from so many batches may be off."""
+    """Return standard errors that a right estimate from so many batches may be off."""
     if not 1 < batches < MANY:
         return ERRORS
     from scipy import special
@@ -171,7 +171,7 @@ def _errors_allowed(batches: int) -> float:
 
 
 def expected_alarms(checks: int) -> float:
-    """Expected maximum number of false alarms among correct checks.
+    """Return the expected maximum number of false alarms among correct checks.
 
     Each may by either of its two estimates.
     """
@@ -179,7 +179,7 @@ def expected_alarms(checks: int) -> float:
 
 
 def _error(values: Floats) -> float:
-    """Standard error of a mean; nan with fewer than two values."""
+    """Return standard error of a mean; nan with fewer than two values."""
     if len(values) < 2:
         return math.nan
     error = float(values.std(ddof=1)) / math.sqrt(len(values))
@@ -191,7 +191,7 @@ FASTER = 0.95  # what the one server beside one responder takes of its time
 
 
 def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
-    """Each control's value in each batch, the most telling first; all have mean zero."""
+    """Return each control's value in each batch, the most telling first; all have mean zero."""
     sample = batches.sample
     counts = _counts(batches, scenario)
     look, square = _looks(sample, scenario)
@@ -207,7 +207,7 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 
 
 def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
-    """Observed and expected inputs: number of events and looking times.
+    """Return the observed and expected inputs: number of events and looking times.
 
     A control removes the randomness of the inputs; the inputs themselves are checked separately:
     their means, and their shapes by one value of the Laplace transform. That is a mean of
@@ -252,7 +252,7 @@ def _transform(law: Law) -> float:
 
 
 def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
-    """From the event before of the same stream to each event, and where that is known."""
+    """Return times from the event before of the same stream, and where they are known."""
     gaps = np.zeros(len(sample.stream))
     known = np.zeros(len(sample.stream), dtype=bool)
     places = np.flatnonzero(sample.stream == number)[1:]
@@ -262,7 +262,7 @@ def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
-    """Number of events of each stream above the expectation from its intervals."""
+    """Return the number of events of each stream above the expectation from its intervals."""
     found = {}
     for number, (name, stream) in enumerate(
         zip(scenario.stream_names, scenario.demand, strict=True)
@@ -276,7 +276,7 @@ def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 def _look_law_of(
     sample: Sample, scenario: TimedScenario
 ) -> Iterator[tuple[Law, NDArray[np.bool_]]]:
-    """Each law of looking, and which of the events that were looked at it is the law of."""
+    """Yield each law of looking, and which of the events that were looked at it is the law of."""
     groups = {group.name: group.look for group in scenario.responders}
     for number, stream in enumerate(scenario.demand):
         for unit, group in enumerate(sample.groups):
@@ -285,7 +285,7 @@ def _look_law_of(
 
 
 def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
-    """Excess of each look over its mean, and of its square; 0 where nobody looked."""
+    """Return excess of each look over its mean, and of its square; 0 where nobody looked."""
     surplus = np.zeros(len(sample.stream))
     square = np.zeros(len(sample.stream))
     took = sample.confirmed - sample.arrived
@@ -296,7 +296,7 @@ def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
 
 
 def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
-    """Waits, above their means, if one fast server had served the same events.
+    """Return waits, above their means, if one fast server had served the same events.
 
     None where not all events are served, or where no formula knows that server's waits.
     """
@@ -321,7 +321,7 @@ def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 
 
 def _ranks(scenario: TimedScenario) -> list[int]:
-    """Place of each stream, the most severe first."""
+    """Return the place of each stream, the most severe first."""
     severities = [stream.severity for stream in scenario.demand]
     levels = sorted({s for s in severities if isinstance(s, float)}, reverse=True)
     return [levels.index(s) if isinstance(s, float) else 0 for s in severities]
@@ -353,7 +353,7 @@ def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float
 
 
 def _look_laws(scenario: TimedScenario) -> list[Law] | None:
-    """Law of the looking time for each stream; None if it depends on the responder."""
+    """Return the law of the looking time for each stream; None if it depends on the responder."""
     robots = any(group.kind == "robot" for group in scenario.responders)
     kind = "robot" if robots else "guard"
     own = {group.look for group in scenario.responders if group.kind == kind}
@@ -363,7 +363,7 @@ def _look_laws(scenario: TimedScenario) -> list[Law] | None:
 
 
 def _products(batches: Batches, scenario: TimedScenario, look: Floats) -> dict[str, Floats]:
-    """Surplus of each step of the queue times the faded surplus of the steps before."""
+    """Return surplus of each step of the queue times the faded surplus of the steps before."""
     from scipy.signal import lfilter
 
     rate = sum(1 / stream.between.mean for stream in scenario.demand if stream.between)

@@ -52,7 +52,7 @@ def hypercube(
     mean_service_s: Memoryless | Sequence[Memoryless],
     queue: Literal["infinite", "none"] = "infinite",
 ) -> Measures:
-    """Workloads and who serves whom, from the Markov chain of all sets of busy units.
+    """Return workloads and who serves whom, from the Markov chain of all sets of busy units.
 
     A call goes to the first free unit on its class's list, each list naming all units. If
     none is free it waits (first come, first served, whatever the class) or is lost.
@@ -86,7 +86,7 @@ def hypercube(
 
 
 def _first_free(orders: Ints, units: int) -> Ints:
-    """Unit that a call of each class gets in each set of busy units `(classes, 2^units)`.
+    """Return the unit that a call of each class gets in each set of busy units.
 
     A set is a number whose bit n says whether unit n is busy; -1 where all are.
     """
@@ -98,7 +98,7 @@ def _first_free(orders: Ints, units: int) -> Ints:
 
 
 def _stationary(calls: Floats, rates: Floats, chosen: Ints) -> Floats:
-    """Chances of the sets, all units being busy counted without a queue `(2^units,)`.
+    """Return chances of the sets, all units being busy counted without a queue `(2^units,)`.
 
     With a queue this is the same, up to its sum: as many calls begin to wait as cease to,
     and whenever there is a queue all units are busy.
@@ -118,7 +118,7 @@ def _stationary(calls: Floats, rates: Floats, chosen: Ints) -> Floats:
 
 
 def _queued(load: float, chance: Floats) -> float:
-    """Probability of a queue relative to no queue; geometric, as all units serve it."""
+    """Return the probability of a queue relative to no queue; geometric, as all units serve it."""
     require_stable(load, "units")
     return float(chance[-1] * load / (1 - load))
 
@@ -153,7 +153,7 @@ def _measures(
 def finite_source(
     sources: int, servers: int, mean_autonomous_s: Memoryless, mean_service_s: Memoryless
 ) -> Measures:
-    """M/M/c//N: each source works alone for an exponential time, then waits for a server.
+    """Return M/M/c//N: each source works alone for an exponential time, then waits for a server.
 
     Measures: `utilisation` of a server, `autonomous` (mean number of sources that work
     alone), `delayed`, `wait_s`, `stay_s`, `throughput` (services per second).
@@ -180,7 +180,7 @@ def finite_source(
 
 
 def fan_out(neglect_s: float, interaction_s: float, robots: int = 1) -> Measures:
-    """Number of robots one operator can serve in the deterministic case.
+    """Return the number of robots one operator can serve in the deterministic case.
 
     `fan_out` is the number at which the operator has just no pause left; with fewer `robots`
     nobody waits, with more each waits until all the others have been served.
@@ -202,7 +202,7 @@ def fan_out(neglect_s: float, interaction_s: float, robots: int = 1) -> Measures
 def priorities(
     arrival_rates: Sequence[float], mean_service_s: Memoryless, servers: int
 ) -> Measures:
-    """M/M/c, several classes with the same law of service.
+    """Return M/M/c, several classes with the same law of service.
 
     References:
         R. H. Davis, Oper. Res. 14 (1966) 133-136; O. Kella & U. Yechiali, Stochastic
@@ -216,7 +216,7 @@ def priorities(
 
 
 def cobham(arrival_rates: Sequence[float], services: Sequence[DurationLaw]) -> Measures:
-    """M/G/1, each class with its own law of service.
+    """Return M/G/1, each class with its own law of service.
 
     References:
         A. Cobham, Oper. Res. 2 (1954) 70-76: `W_k = W_0 / ((1 - sigma_(k-1)) (1 - sigma_k))`,
@@ -228,7 +228,7 @@ def cobham(arrival_rates: Sequence[float], services: Sequence[DurationLaw]) -> M
 
 
 def _by_class(ahead: float, rates: Sequence[float], loads: Sequence[float]) -> Measures:
-    """Waits from the mean work that is in service when somebody comes [s]."""
+    """Return waits from the mean work that is in service when somebody comes [s]."""
     if not sum(loads) < 1:
         raise ValueError(f"the servers are offered {sum(loads):g} of what they can do")
     waits = []
@@ -248,7 +248,7 @@ CENTRE = (math.sqrt(2) + math.log(1 + math.sqrt(2))) / 6
 
 
 def square_centre(side_m: float = 1.0) -> Measures:
-    """Distance from the centre to a random place: mean and mean square.
+    """Return the distance from the centre to a random place: mean and mean square.
 
     References:
         R. C. Larson & A. R. Odoni, Urban Operations Research (1981), chapter 3; the mean
@@ -284,7 +284,7 @@ def square_nearest(places: int, side_m: float = 1.0) -> Measures:
 def sqm(
     arrival_rate: float, service: DurationLaw, side_m: float = 1.0, speed_mps: float = 1.0
 ) -> Measures:
-    """One responder that starts from the centre of a square and comes back after each event.
+    """Return one responder that starts from the centre of a square and comes back after each event.
 
     M/G/1 whose service is the way there, the time on scene, and the way back. `response_s`
     is from detection to arrival.
@@ -301,7 +301,7 @@ def sqm(
 
 
 def _mean_nearest(x: float, y: float, places: int, nodes: Floats, weights: Floats) -> float:
-    """Integral of `(1 - A)^k` over r for an event at (x, y), piece by piece.
+    """Return the integral of `(1 - A)^k` over r for an event at (x, y), piece by piece.
 
     The area within r has kinks where the circle first reaches a side or a corner.
     """
@@ -326,13 +326,13 @@ def _quarter(r: Floats, a: float, b: float) -> Floats:
 
 
 def _under_circle(x: Floats, r: Floats) -> Floats:
-    """Integral of `sqrt(r^2 - t^2)` from 0 to x."""
+    """Return the integral of `sqrt(r^2 - t^2)` from 0 to x."""
     ratio = np.clip(x / np.maximum(r, 1e-300), 0.0, 1.0)
     return (x * np.sqrt(np.maximum(r**2 - x**2, 0.0)) + r**2 * np.arcsin(ratio)) / 2
 
 
 def assignment(events: int, responders: int, mean_s: float = 1.0) -> Measures:
-    """Total travel time if each pair's is exponential and independent of all others'.
+    """Return the total travel time if each pair's is exponential and independent of all others'.
 
     Every event gets a responder, or every responder an event, whatever there is less of.
     `optimal_s` is the least total; `greedy_s` the one of always taking the nearest pair, or

@@ -33,7 +33,7 @@ Flags = NDArray[np.bool_]
 
 
 def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
-    """A policy's choice does not depend on where north is, nor on who is listed first.
+    """Yield cases turned and reordered: a choice hangs on neither north nor lists.
 
     How often each chooses otherwise once a place is turned and its team shuffled.
     """
@@ -59,7 +59,7 @@ def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
 
 
 def _turned(points: Floats, angle: float) -> Floats:
-    """The points rotated about somewhere far away, shape `(n, 2)`."""
+    """Return the points rotated about somewhere far away, shape `(n, 2)`."""
     cosine = math.cos(angle)
     sine = math.sin(angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
@@ -69,7 +69,7 @@ def _turned(points: Floats, angle: float) -> Floats:
 def _choice(
     policy: str, goals: Floats, starts: Floats, severities: Floats, robots: Flags, order: Ints
 ) -> Choice:
-    """Assignments of a policy, by event number and responder."""
+    """Return assignments of a policy, by event number and responder."""
     tasks = tuple(
         Task(
             event=number + 1,
@@ -139,7 +139,7 @@ def check_identity(name: str, seed: int) -> list[tuple[str, float]]:
 
 # --- one path, known from another calculation ------------------------------------------
 def _first_come_first_served(seed: int) -> Deviations:
-    """Waits are those of Kiefer and Wolfowitz's recursion, event by event."""
+    """Compare waits with Kiefer and Wolfowitz's recursion, event by event."""
     for guards in (1, 2, 5):
         scenario = {
             "model": "timed",
@@ -156,7 +156,7 @@ def _first_come_first_served(seed: int) -> Deviations:
 
 
 def _conservation(seed: int) -> Deviations:
-    """Every event is closed in one way and one only, whatever happens to it."""
+    """Count events that are not closed in one way and one only."""
     scenario = copy.deepcopy(_PLACES)
     scenario["responders"][0] |= {"kind": "robot"}
     scenario["operators"] = {"count": 1}
@@ -173,7 +173,7 @@ def _conservation(seed: int) -> Deviations:
 
 # --- the same world, seen otherwise ----------------------------------------------------
 def _time_scaling(seed: int) -> Deviations:
-    """With everything 8 times as slow every moment comes 8 times as late."""
+    """Compare moments 8 times as late with a run in which everything is 8 times as slow."""
     scenario = copy.deepcopy(_PLACES)
     scenario["dispatch"] = {"policy": "priority_eta", "options": {"ageing_per_s": 0.002}}
     scenario["dispatch"]["escalate_after_s"] = 900
@@ -183,7 +183,7 @@ def _time_scaling(seed: int) -> Deviations:
 
 
 def _relabelling(seed: int) -> Deviations:
-    """Other names, and another order of the same responders, change nothing."""
+    """Compare runs under other names, and another order of the same responders."""
     plain = _run(_PLACES, seed)
     named = copy.deepcopy(_PLACES)
     for number, group in enumerate(named["responders"]):
@@ -195,7 +195,7 @@ def _relabelling(seed: int) -> Deviations:
 
 # --- better and worse ------------------------------------------------------------------
 def _best_of_all(seed: int) -> Deviations:
-    """All events at once: the best assignment is never worse than the nearest first."""
+    """Compare all events at once: the best assignment is never worse than the nearest first."""
     ways: dict[str, dict[str, Any]] = {
         "straight ways": {"area": {"width_m": 100, "height_m": 100}},
         "ways by chance": {"travel": {"law": "exponential", "mean_s": 60}},
@@ -220,7 +220,7 @@ def _best_of_all(seed: int) -> Deviations:
 
 
 def _oracle(seed: int) -> Deviations:
-    """Nobody has a smaller sum of responses than who knows the future."""
+    """Compare sums of responses with those of who knows the future."""
     scenario = _PLACES | {"max_events": 6, "horizon_s": 10_000, "drain": False}
     scenario["responders"] = [g | {"after": "return"} for g in _PLACES["responders"][:2]]
     scenario["demand"] = [
@@ -256,7 +256,7 @@ def _run(scenario: dict[str, Any], seed: int) -> TimedRecording:
 
 
 def _beyond(off: float) -> float:
-    """Deviation that the clock's step does not explain."""
+    """Return the deviation that the clock's step does not explain."""
     return float(off) if off > SLACK_S else 0.0
 
 
@@ -272,7 +272,10 @@ def _slower(node: Any, key: str = "") -> Any:
 
 
 def _apart(one: TimedRecording, other: TimedRecording, factor: float = 1.0) -> float:
-    """The largest difference between the moments of two runs [s]; infinite if events differ."""
+    """Return the largest difference between the moments of two runs [s].
+
+    Infinite if events differ.
+    """
     if one.events != other.events:
         return np.inf
     pairs = [(one.columns[name] * factor, other.columns[name]) for name in TIMES]

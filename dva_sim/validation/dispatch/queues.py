@@ -54,13 +54,13 @@ class LawMoments(NamedTuple):
 
 
 def _usual(utilisation: float, delayed: float, wait_s: float, service_s: float) -> Measures:
-    """The measures that most queues have."""
+    """Return the measures that most queues have."""
     stay_s = wait_s + service_s
     return {"utilisation": utilisation, "delayed": delayed, "wait_s": wait_s, "stay_s": stay_s}
 
 
 def erlang_b(servers: int, load: float) -> float:
-    """Probability that all servers are busy if nobody waits.
+    """Return the probability that all servers are busy if nobody waits.
 
     Args:
         servers: Number of servers.
@@ -76,7 +76,7 @@ def erlang_b(servers: int, load: float) -> float:
 
 
 def erlang_c(servers: int, load: float) -> float:
-    """Probability of having to wait if everybody waits; needs `load < servers`.
+    """Return the probability of having to wait if everybody waits; needs `load < servers`.
 
     References:
         Gross et al. (2008), chapter 2 (several servers).
@@ -89,7 +89,7 @@ def erlang_c(servers: int, load: float) -> float:
 def mmc(
     arrival_rate: float, mean_service_s: Memoryless, servers: int, at_s: Sequence[float] = ()
 ) -> Measures:
-    """M/M/c: random arrivals, exponential service, everybody waits, first come first served.
+    """Return M/M/c: random arrivals, exponential service, everybody waits, first come first served.
 
     Beside the usual measures: `wait_50_s`, `wait_90_s` and `wait_95_s`, quantiles of the wait
     of all customers (0 for those who need not wait), and `beyond_T`, the share that waits
@@ -110,7 +110,7 @@ def mmc(
 
 
 def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
-    """M/G/c/c: who finds all servers busy is lost; only the mean of the service matters.
+    """Return M/G/c/c: who finds all servers busy is lost; only the mean of the service matters.
 
     References:
         A. K. Erlang (1917); insensitivity: B. A. Sevastyanov, Theory Probab. Appl. 2 (1957)
@@ -122,7 +122,7 @@ def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
 
 
 def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: int) -> Measures:
-    """M/M/c/K: at most `places` customers wait (K = c + places); others are lost.
+    """Return M/M/c/K: at most `places` customers wait (K = c + places); others are lost.
 
     References:
         Gross et al. (2008), chapter 2 (a limited queue).
@@ -139,7 +139,7 @@ def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: 
 
 
 def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
-    """M/G/1: one server, any law of service, everybody waits.
+    """Return M/G/1: one server, any law of service, everybody waits.
 
     References:
         F. Pollaczek (1930), A. Khinchine (1932); Kleinrock (1975), eq. (5.113).
@@ -150,7 +150,7 @@ def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
 
 
 def gm1(between: distributions.Law, mean_service_s: Memoryless) -> Measures:
-    """G/M/1: any law between arrivals, one server with exponential service.
+    """Return G/M/1: any law between arrivals, one server with exponential service.
 
     References:
         Kleinrock (1975), section 6.4: sigma is the root of `sigma = A*(mu - mu sigma)`
@@ -169,7 +169,7 @@ def gm1(between: distributions.Law, mean_service_s: Memoryless) -> Measures:
 def erlang_a(
     arrival_rate: float, mean_service_s: Memoryless, servers: int, mean_patience_s: Memoryless
 ) -> Measures:
-    """M/M/c+M: who waits gives up after an exponential time.
+    """Return M/M/c+M: who waits gives up after an exponential time.
 
     Beside the usual measures: `abandoned`, share of all customers who give up, and
     `wait_all_s`, mean wait of all customers, who gave up included.
@@ -205,7 +205,7 @@ def tandem(
     second_service_s: Memoryless,
     second_servers: int,
 ) -> Measures:
-    """Two M/M/c in a row: the second sees random arrivals, as if the first were not there.
+    """Return two M/M/c in a row: the second sees random arrivals, as if the first were not there.
 
     Measures carry the number of their station: `wait_1_s`, `wait_2_s`, `utilisation_1`, ...;
     `stay_s` is the whole way through.

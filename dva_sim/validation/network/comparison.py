@@ -55,7 +55,7 @@ class ModelRuns:
 def play_all(
     orders: Sequence[ModelRuns], seed: int, workers: int, progress: Progress = lambda done: None
 ) -> dict[ModelRuns, list[Row]]:
-    """The results of every run of some orders.
+    """Return the results of every run of some orders.
 
     Run n of a condition has the same random numbers at every depth and with every ablation.
 
@@ -75,7 +75,7 @@ def play_all(
 
 
 def perform(job: StudyJob) -> Tables:
-    """The runs of one job."""
+    """Return the runs of one job."""
     row, depth, without, first, count = _asked(job)
     condition = Condition.from_row(row)
     seeds = [
@@ -102,7 +102,7 @@ def _asked(job: StudyJob) -> tuple[dict[str, str], Depth, tuple[str, ...], int, 
 
 
 def _effort(job: StudyJob) -> float:
-    """Commands to be played, about."""
+    """Return commands to be played, about."""
     row, _, _, _, count = _asked(job)
     return count * float(row["hz"]) * float(row["dur_s"])
 
@@ -142,7 +142,7 @@ class NetworkSetting:
     ablate: bool = False
 
     def runs(self, group: ConditionGroup) -> int:
-        """Number of model runs of a condition: one if nothing is random."""
+        """Return the number of model runs of a condition: one if nothing is random."""
         condition = group.condition
         if condition.loss > 0:
             return QUICK_RUNS if self.quick else RUNS
@@ -178,7 +178,7 @@ class NetworkComparison:
     ablated: dict[str, Pooled] = field(default_factory=dict)
 
     def of_kind(self, kind: ConditionKind) -> list[CellVerdict]:
-        """The verdicts on conditions of a kind."""
+        """Return the verdicts on conditions of a kind."""
         return [v for v in self.verdicts if v.cell.group.kind == kind]
 
     @property
@@ -255,18 +255,18 @@ def orders_of(
 
 
 def pooled_of(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
-    """The conditions that are pooled."""
+    """Return the conditions that are pooled."""
     return [group for group in groups if group.kind == "pooled"]
 
 
 def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
-    """Number of runs in a comparison."""
+    """Return the number of runs in a comparison."""
     played = [group for group in groups if not group.left_out]
     return sum(order.runs for own in orders_of(played, setting).values() for order in own)
 
 
 def depths_of(comparison: NetworkComparison) -> dict[str, int]:
-    """Number of conditions simulated at each depth."""
+    """Return the number of conditions simulated at each depth."""
     return Counter(depth_for(group.condition) for group in comparison.groups)
 
 

@@ -48,7 +48,7 @@ _line = partial(Evidence, "network")
 def evidence(
     comparison: NetworkComparison, conditions: Mapping[str, str], causes: Mapping[str, str]
 ) -> ValidationResult:
-    """Result of all conditions.
+    """Return the result of all conditions.
 
     Args:
         conditions: Conditions of the comparison, by name.
@@ -66,7 +66,7 @@ def evidence(
 
 
 def lines_of(comparison: NetworkComparison, causes: Mapping[str, str]) -> list[Evidence]:
-    """Every measure of every condition by its kind, misses that count with their causes."""
+    """Return every measure of every condition by its kind, misses that count with their causes."""
     lines = [
         replace(
             _of_cell(verdict.cell),
@@ -95,7 +95,7 @@ def lines_of(comparison: NetworkComparison, causes: Mapping[str, str]) -> list[E
 
 
 def _with_cause(line: Evidence, causes: Mapping[str, str]) -> Evidence:
-    """A miss with its cause; of single runs some have to miss."""
+    """Return a miss with its cause; of single runs some have to miss."""
     if line.verdict != "misses" or line.group == GROUPS["single"]:
         return line
     cause = causes.get(line.line.split()[0], "cause not known")
@@ -117,12 +117,12 @@ def _of_cell(cell: ComparedCell) -> Evidence:
 
 
 def _source(group: ConditionGroup) -> str:
-    """The table of measurements."""
+    """Return the table of measurements."""
     return f"real sockets, {' and '.join(sorted({run.source for run in group.runs}))} runs"
 
 
 def _of_score(scored: Scored, is_significant: bool) -> Evidence:
-    """A mean over runs, judged by z among all; its interval is that of the difference."""
+    """Return a mean over runs, judged by z among all; its interval is that of the difference."""
     half = NORMAL_95 * scored.error
     return replace(
         _of_cell(scored.cell),
@@ -138,7 +138,7 @@ def _finite(value: float) -> float | None:
 
 
 def rule_of(comparison: NetworkComparison) -> Iterator[Evidence]:
-    """The rule for all lines: shares inside, pooled runs together, and models found out."""
+    """Yield the rule for all lines: shares inside, pooled runs together, and models found out."""
     if not comparison.judged:
         return
     for kind in KINDS:
@@ -161,7 +161,7 @@ def rule_of(comparison: NetworkComparison) -> Iterator[Evidence]:
 
 
 def _rule_of_pooled(pooled: Pooled) -> Iterator[Evidence]:
-    """Nothing significant, z as far off as chance explains, and no bias."""
+    """Yield the rule of pooled figures: nothing significant, z within chance, and no bias."""
     what = "pooled under loss: {}".format
     low, high = pooled.expected
     yield _line(
@@ -199,7 +199,7 @@ def _rule_of_pooled(pooled: Pooled) -> Iterator[Evidence]:
 
 
 def notes(comparison: NetworkComparison) -> list[str]:
-    """Notes on what is judged, on missing conditions and on findings."""
+    """Return notes on what is judged, on missing conditions and on findings."""
     judged = comparison.judged
     counts = ", ".join(
         f"{sum(g.kind == kind for g in judged)} {words}"

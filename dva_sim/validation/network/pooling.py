@@ -94,13 +94,13 @@ class Pooled:
 
 
 def bias_limit(measure: ComparedMeasure) -> float:
-    """Largest acceptable median bias."""
+    """Return the largest acceptable median bias."""
     tail_of_age = measure.is_tail and measure.name.startswith(("age", "stale"))
     return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
 
 
 def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
-    """A variant of the model by the measures, and in the standard errors, of the model itself.
+    """Return a variant of the model, with the standard errors of the model itself.
 
     So it cannot gain or lose by how much its own runs differ.
 
@@ -118,7 +118,7 @@ def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
 
 
 def to_be_pooled(cells: Sequence[ComparedCell]) -> list[ComparedCell]:
-    """The cells that may be judged, say something, and differ from run to run."""
+    """Return the cells that may be judged, say something, and differ from run to run."""
     return [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
 
 
@@ -138,7 +138,6 @@ def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
 
 
 def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
-    """Judge the scores."""
     found = holm([s.p for s in scored]) <= SIGNIFICANT
     offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
     return Pooled(
@@ -152,7 +151,7 @@ def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarm
 
 
 def tells(cell: ComparedCell) -> bool:
-    """True if a mean over runs is meaningful: nearly always defined, events not rare."""
+    """Return True if a mean over runs is meaningful: nearly always defined, events not rare."""
     runs = len(cell.group.runs)
     if not len(cell.measured) or len(cell.predicted) < 2:
         return False
@@ -162,12 +161,12 @@ def tells(cell: ComparedCell) -> bool:
 
 
 def is_steady(cell: ComparedCell) -> bool:
-    """True if runs differ by less than the model's resolution."""
+    """Return True if runs differ by less than the model's resolution."""
     return tells(cell) and chance(cell) < resolution(cell)
 
 
 def score(cell: ComparedCell, error: float) -> Scored:
-    """z of one cell.
+    """Return z of one cell.
 
     Args:
         error: Standard error of the difference of means.
@@ -182,13 +181,13 @@ def standard_error(cell: ComparedCell) -> float:
 
 
 def chance(cell: ComparedCell) -> float:
-    """Standard error of the difference of the means, by how much the model's runs differ."""
+    """Return standard error of the difference of the means, by how much the model's runs differ."""
     spread = float(cell.predicted.std(ddof=1))
     return float(spread * np.sqrt(1 / len(cell.measured) + 1 / len(cell.predicted)))
 
 
 def resolution(cell: ComparedCell) -> float:
-    """Change of the measure if each command took half a millisecond longer."""
+    """Return the change of the measure if each command took half a millisecond longer."""
     measure = cell.measure
     condition = cell.group.condition
     if measure.is_time:
@@ -204,7 +203,7 @@ def resolution(cell: ComparedCell) -> float:
 
 
 def null_scores(cells: Sequence[ComparedCell], rng: np.random.Generator) -> Floats:
-    """z if runs of the model take the sockets' place, shape `(DRAWS, cells)`.
+    """Return z if runs of the model take the sockets' place, shape `(DRAWS, cells)`.
 
     A condition's measures are taken from the same runs, so that they go together as they do;
     the model's own mean is one of other runs, and what cannot be told apart is an offset.
@@ -225,7 +224,7 @@ def null_scores(cells: Sequence[ComparedCell], rng: np.random.Generator) -> Floa
 
 
 def two_sided(z: Floats) -> Floats:
-    """Probability of such a z or a larger one, by the normal law."""
+    """Return the probability of such a z or a larger one, by the normal law."""
     from scipy.special import ndtr
 
     return np.asarray(2.0 * ndtr(-np.abs(z)))

@@ -99,7 +99,7 @@ def predict(
 
 
 def depth_for(condition: Condition, depth: Depth = "auto") -> Played:
-    """Depth at which a condition is simulated.
+    """Return the depth at which a condition is simulated.
 
     Messages are enough where the link is calm, the robot keeps up, no buffer matters, and
     what is under way fits into TCP's initial window.
@@ -115,7 +115,7 @@ def depth_for(condition: Condition, depth: Depth = "auto") -> Played:
 
 
 def tcp_options(condition: Condition, without: Sequence[str]) -> TcpOptions:
-    """TCP's options at both ends, with some mechanisms left out.
+    """Return TCP's options at both ends, with some mechanisms left out.
 
     Raises:
         ConfigError: there is no such mechanism.
@@ -129,7 +129,7 @@ def tcp_options(condition: Condition, without: Sequence[str]) -> TcpOptions:
 
 
 def make_links(condition: Condition, streams: Streams) -> tuple[Link, Link]:
-    """The emulated link from the operator to the robot, and the one back."""
+    """Return the emulated link from the operator to the robot, and the one back."""
     config = condition.link(LATE_S)
     up = make_link(config, "up", streams, "link/up")
     return up, make_link(config, "down", streams, "link/down")
@@ -189,7 +189,7 @@ class PredictedRun:
         self._notes.append(Note(kind, number, self._clock.now if at is None else at))
 
     def _opened(self, node: str, peer: str) -> None:
-        """A connection stands: after the first the operator's program starts, a publisher later."""
+        """Take a connection: after the first the operator's program starts, a publisher later."""
         if self._is_open:
             return
         self._is_open = True
@@ -214,7 +214,7 @@ class PredictedRun:
 
 
 def _connector(condition: Condition, depth: Played, without: Sequence[str]) -> Connector:
-    """Connections with the options of the condition's sockets."""
+    """Return connections with the options of the condition's sockets."""
     zeromq = ZeromqConfig(
         high_water_mark=condition.hwm,
         send_buffer_bytes=condition.sndbuf,

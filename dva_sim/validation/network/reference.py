@@ -71,7 +71,7 @@ class SocketRun:
 
 
 def load_runs(sources: Mapping[str, SourceConfig]) -> list[SocketRun]:
-    """Every run of some tables, in their order.
+    """Return every run of some tables, in their order.
 
     Raises:
         ConfigError: a table cannot be read, or something in it is not as it should be.
@@ -80,7 +80,7 @@ def load_runs(sources: Mapping[str, SourceConfig]) -> list[SocketRun]:
 
 
 def read_runs(name: str, source: SourceConfig) -> list[SocketRun]:
-    """The runs of one table.
+    """Return the runs of one table.
 
     Raises:
         ConfigError: it cannot be read, or something in it is not as it should be.
@@ -179,7 +179,7 @@ class PlanConfig(Config):
 
 
 def load_plan(name: str = SHIPPED) -> PlanConfig:
-    """The document, by name or path.
+    """Return the document, by name or path.
 
     Raises:
         ConfigError: no such file, or a mistake in it, with its place.
@@ -195,7 +195,7 @@ def load_plan(name: str = SHIPPED) -> PlanConfig:
 
 
 def conditions_of(block: BlockConfig) -> list[Condition]:
-    """Every link with every pair of programs.
+    """Return every link with every pair of programs.
 
     Raises:
         ConfigError: a setting that no condition has.

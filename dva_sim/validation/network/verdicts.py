@@ -65,7 +65,7 @@ def _group(condition: Condition, runs: Sequence[SocketRun]) -> ConditionGroup:
 
 
 def why_not_judged(condition: Condition) -> str:
-    """Reason why a condition must not be judged; empty if it may.
+    """Return the reason why a condition must not be judged; empty if it may.
 
     Where the service time is a whole number of periods, the next command comes just when the
     robot is free: whether it counts hangs on how much longer than asked a program sleeps.
@@ -82,7 +82,7 @@ def why_not_judged(condition: Condition) -> str:
 
 
 def load(condition: Condition) -> float:
-    """Share of what the robot and the link can do that is asked of them.
+    """Return the share of what the robot and the link can do that is asked of them.
 
     A requester waits for its reply, so it asks too much only of a robot that needs longer
     than the time-out: requests then come at that pace.
@@ -97,13 +97,13 @@ def load(condition: Condition) -> float:
 
 
 def is_bounded(condition: Condition) -> bool:
-    """True if a buffer is smaller than by default."""
+    """Return True if a buffer is smaller than by default."""
     small = condition.sndbuf is not None or condition.rcvbuf is not None
     return small or condition.hwm < 1000 or condition.conflate != "none"
 
 
 def may_livelock(condition: Condition) -> bool:
-    """True if one loss can end all control.
+    """Return True if one loss can end all control.
 
     A new socket needs three round trips before its request leaves, and the reply needs one more and
     the service time.
@@ -164,7 +164,7 @@ JUDGED_EXACTLY = MEASURES[:7]
 
 
 def values_of(row: Row) -> dict[str, float]:
-    """The measures of one run, from the columns of results.
+    """Return the measures of one run, from the columns of results.
 
     Those that have no column of their own:
 
@@ -213,7 +213,7 @@ class ComparedCell:
 
 
 def cells_of(group: ConditionGroup, predicted: Sequence[Row]) -> list[ComparedCell]:
-    """Every measure of a condition that is defined on either side.
+    """Return every measure of a condition that is defined on either side.
 
     Time-outs and alerts are a requester's.
     """
@@ -281,7 +281,7 @@ def judge(cell: ComparedCell) -> CellVerdict:
 
 
 def reason_against(cell: ComparedCell) -> str:
-    """Reason why a measure of a condition is not judged; empty if it is."""
+    """Return the reason why a measure of a condition is not judged; empty if it is."""
     group = cell.group
     measure = cell.measure
     if group.left_out:
@@ -302,7 +302,7 @@ def reason_against(cell: ComparedCell) -> str:
 
 
 def _band(cell: ComparedCell) -> tuple[float, float]:
-    """Around what was measured."""
+    """Return the band around what was measured."""
     group = cell.group
     measure = cell.measure
     real = cell.real
@@ -316,14 +316,17 @@ def _band(cell: ComparedCell) -> tuple[float, float]:
 
 
 def _absolute(cell: ComparedCell) -> float:
-    """Absolute part of the band, added to the share; none in an overload."""
+    """Return the absolute part of the band, added to the share; none in an overload."""
     if cell.group.kind == "overload":
         return 0.0
     return TIME_MS if cell.measure.is_time else RATE_HZ
 
 
 def _interval(cell: ComparedCell) -> tuple[float, float]:
-    """The 95 % prediction interval of one run, made wider; empty where nothing is predicted."""
+    """Return the 95 % prediction interval of one run, made wider.
+
+    Empty where nothing is predicted.
+    """
     if not len(cell.predicted):
         return math.inf, -math.inf
     low, high = np.percentile(cell.predicted, INTERVAL, method="inverted_cdf")
@@ -332,6 +335,6 @@ def _interval(cell: ComparedCell) -> tuple[float, float]:
 
 
 def share_inside(verdicts: Sequence[CellVerdict]) -> tuple[int, int]:
-    """Number of judged verdicts inside, and number of judged verdicts."""
+    """Return the number of judged verdicts inside, and number of judged verdicts."""
     judged = [v for v in verdicts if v.word != "shown only"]
     return sum(v.word == "inside" for v in judged), len(judged)

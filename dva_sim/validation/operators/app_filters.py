@@ -40,7 +40,7 @@ def steps() -> Values:
 
 
 def step_outputs(name: str) -> list[float]:
-    """Outputs of a filter for those levels, one per `STEP_LOOK`."""
+    """Return outputs of a filter for those levels, one per `STEP_LOOK`."""
     return _outputs(load_filter(name)(1.0 / RATE), STEP_LEVELS, STEP_LOOK)
 
 
@@ -52,7 +52,7 @@ def smoothing(seed: int) -> Values:
 
 
 def _mean_age(filter_: Filter, longest: float) -> float:
-    """On a ramp of one per second, over whole periods between two looks [s]."""
+    """Return the mean age on a ramp of one per second, over whole periods between two looks [s]."""
     samples = [n / RATE for n in range(1, round(40 * RATE) + 1)]
     values = _outputs(filter_, samples, longest)
     period = _period(longest)
@@ -62,7 +62,7 @@ def _mean_age(filter_: Filter, longest: float) -> float:
 
 
 def _outputs(filter_: Filter, samples: list[float], longest: float) -> list[float]:
-    """The value at each look at the filter."""
+    """Return the value at each look at the filter."""
     values = []
     due = 0
     looks = 1
@@ -77,5 +77,5 @@ def _outputs(filter_: Filter, samples: list[float], longest: float) -> list[floa
 
 
 def _period(longest: float) -> float:
-    """Between two looks [s]."""
+    """Return the period between two looks [s]."""
     return min(longest, BATCH / RATE)

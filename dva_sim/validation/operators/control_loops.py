@@ -33,7 +33,7 @@ Loop = Callable[[float], Sequence[float]]
 
 
 def critical(loop: Loop, low: float, high: float) -> float:
-    """The parameter at which the errors of a loop neither grow nor die away, by bisection.
+    """Return the parameter at which the errors of a loop neither grow nor die away, by bisection.
 
     Args:
         loop: Plays the loop.
@@ -52,14 +52,14 @@ def critical(loop: Loop, low: float, high: float) -> float:
 
 
 def grows(errors: Sequence[float]) -> bool:
-    """True if the last eighth swings farther than the second; the first is the start."""
+    """Return True if the last eighth swings farther than the second; the first is the start."""
     swings = np.abs(np.asarray(errors))
     eighth = len(swings) // 8
     return bool(swings[-eighth:].max() > swings[eighth : 2 * eighth].max())
 
 
 def integrator(gain_delay: float) -> list[float]:
-    """A cursor that a strategy brings to its target by the crossover law, seen a delay of 1 late.
+    """Return a cursor brought to its target by the crossover law, seen a delay of 1 late.
 
     What is seen holds for a step, so half a step more would pass on average; the mean of two
     neighbouring frames takes that off.
@@ -78,7 +78,7 @@ def integrator(gain_delay: float) -> list[float]:
 
 
 def pure_pursuit(speed_delay: float) -> list[float]:
-    """A robot that `Pursuit` drives along a straight line, seen 1 s late.
+    """Return a robot that `Pursuit` drives along a straight line, seen 1 s late.
 
     The look-ahead is the nearest that there is.
 
@@ -111,7 +111,7 @@ def pure_pursuit(speed_delay: float) -> list[float]:
 
 
 def smith_response(gain: float, delay: float, end: float) -> list[float]:
-    """Positions of a cursor steered by `Predictor` after a target appears 1 m away.
+    """Return positions of a cursor steered by `Predictor` after a target appears 1 m away.
 
     The predictor adds to what is seen what was asked for since and cannot be seen yet, so the
     loop is closed on the present: y(t) = 1 - exp(-gain (t - delay)) from the delay on.
@@ -135,12 +135,12 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
 
 
 def _person(gain: float = 1.0) -> Person:
-    """A person of that gain [1/s] in a loop that no margin keeps stable."""
+    """Return a person of that gain [1/s] in a loop that no margin keeps stable."""
     return replace(median_person(Population()), pointing=gain, margin=_FAR, pace=1.0)
 
 
 def _cursor(x: float, target: float) -> Sighting:
-    """A cursor on a line, and a target that stands still [m]."""
+    """Return a cursor on a line, and a target that stands still [m]."""
     return Sighting(
         tick=0,
         x=x,

@@ -53,7 +53,7 @@ def evidence(
     played: Mapping[str, Cells],
     conditions: Mapping[str, str],
 ) -> ValidationResult:
-    """Result of all lines.
+    """Return the result of all lines.
 
     Args:
         lines: Published numbers.
@@ -84,7 +84,7 @@ def evidence(
 
 
 def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[Evidence]:
-    """A verdict for each line; what was not simulated is nan, and misses."""
+    """Return a verdict for each line; what was not simulated is nan, and misses."""
     return [_judged(line, found.get(line.id, certain(math.nan))) for line in lines]
 
 
@@ -122,7 +122,7 @@ def _judged(line: TargetLine, found: Found) -> Evidence:
 def rule_of(
     lines: Sequence[TargetLine], verdicts: Sequence[Evidence], rule: RuleConfig
 ) -> list[Evidence]:
-    """The shares that must hold, and how many publications hold in all their lines."""
+    """Return the shares that must hold, and how many publications hold in all their lines."""
     shares = {"exact": rule.exact, "held-out": rule.held_out}
     rows = []
     for kind, least in shares.items():
@@ -151,7 +151,7 @@ def rule_of(
 
 
 def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
-    """Share of time in move-and-wait, by experiment and cell."""
+    """Return the share of time in move-and-wait, by experiment and cell."""
     rows = []
     for name, cells in _steering(played).items():
         shares = {
@@ -166,7 +166,7 @@ def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
 
 
 def _steering(played: Mapping[str, Cells]) -> dict[str, Cells]:
-    """The experiments in which something is steered."""
+    """Return the experiments in which something is steered."""
     return {
         name: cells
         for name, cells in played.items()

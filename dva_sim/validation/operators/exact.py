@@ -45,7 +45,7 @@ PPM = (30, 50, 100, 300)
 
 
 def fires() -> Values:
-    """Times at which each class of fire reaches 1055 kW [s]."""
+    """Return times at which each class of fire reaches 1055 kW [s]."""
     times = np.arange(0.0, 700.0, 0.05)
     found = {}
     for growth in GROWTH_S:
@@ -57,7 +57,7 @@ def fires() -> Values:
 
 
 def helpers(seed: int) -> Values:
-    """The times within which nine in ten turn out, and arrive [s].
+    """Return the times within which nine in ten turn out, and arrive [s].
 
     Turnout to a fire is that of the guards, to a patient that of an ambulance, which drives.
     """
@@ -83,7 +83,7 @@ def helpers(seed: int) -> Values:
 
 
 def alarms() -> Values:
-    """Times at which a carbon monoxide alarm sounds, by ppm [min]; infinite if never."""
+    """Return times at which a carbon monoxide alarm sounds, by ppm [min]; infinite if never."""
     return {str(ppm): _alarm_time(float(ppm)) / 60.0 for ppm in PPM}
 
 
@@ -96,12 +96,12 @@ def walkers(seed: int) -> Values:
 
 
 def plumes() -> Values:
-    """Width of a plume 1 km downwind by stability class [m]."""
+    """Return the width of a plume 1 km downwind by stability class [m]."""
     return {stability: sigma_y(stability, 1000.0) for stability in "ABCDEF"}
 
 
 def guard_profile() -> GuardProfile:
-    """The guards of the validation."""
+    """Return the guards of the validation."""
     document = load_yaml(resources.find("guard", "agents/people"))
     return validate(GuardProfile, document.data, document.error)
 

@@ -94,7 +94,7 @@ def lag_values(cells: Cells) -> Values:
 
 
 def lag_slope(cells: Cells) -> float:
-    """The publication's model, MT = a + (b + c LAG) ID, through the means; 4 c [ms/ms]."""
+    """Return the publication's model, MT = a + (b + c LAG) ID, through the means; 4 c [ms/ms]."""
     rows = [
         (1.0, bits, bits * float(lag), 1000.0 * float(some["movement_time_s"].mean()))
         for lag, trials in cells.items()
@@ -106,12 +106,12 @@ def lag_slope(cells: Cells) -> float:
 
 # --- pointing by tilt: MacKenzie & Teather 2012 ----------------------------------------------
 def tilt_cell(gain: int, selection: str) -> str:
-    """Name of a cell."""
+    """Return the name of a cell."""
     return f"{gain}/{selection}"
 
 
 def tilt_values(cells: Cells) -> Values:
-    """Throughput at a gain of 50, the best gain, and the range of the largest tilts."""
+    """Return the throughput at a gain of 50, the best gain, and the range of the largest tilts."""
     values = {f"S9/{s}": throughput(cells[tilt_cell(PUBLISHED_GAIN, s)]) for s in SELECTIONS}
     times = [
         np.mean([mean(cells[tilt_cell(g, s)], "movement_time_s") for s in SELECTIONS])
@@ -123,7 +123,7 @@ def tilt_values(cells: Cells) -> Values:
 
 
 def throughput(trials: Trials) -> float:
-    """Bits per second: of each person and condition, then the mean of all.
+    """Return bits per second: of each person and condition, then the mean of all.
 
     Selections cannot miss here, so the index is the nominal one.
     """
@@ -135,7 +135,7 @@ def throughput(trials: Trials) -> float:
 
 # --- steering: Wang et al. 2021; latency of steering -----------------------------------------
 def steering_values(cells: Cells) -> Values:
-    """Linearity in ID of the movement time's mean, and in its square of the variance."""
+    """Return the linearity in ID of the movement time's mean, and in its square of the variance."""
     ids, means, variances = steering_points(cells["tunnel"])
     return {
         "S11/mean": fit_line(ids, means).r2,
@@ -154,14 +154,14 @@ def steering_points(trials: Trials) -> tuple[Floats, Floats, Floats]:
 
 
 def latency_values(cells: Cells) -> Values:
-    """Ratios of mean movement times of steering."""
+    """Return ratios of mean movement times of steering."""
     times = {name: mean(trials, "movement_time_s") for name, trials in cells.items()}
     return {f"S12/{name}": times[name] / times["as it is"] for name in ("less", "more")}
 
 
 # --- waiting for what one has done: Ferrell 1965, an excavator -------------------------------
 def wait_values(cells: Cells) -> Values:
-    """Linearity of completion time in the delay, and the slope without the waits.
+    """Return the linearity of completion time in the delay, and the slope without the waits.
 
     The slope of who does not wait says nothing of move-and-wait.
     """
@@ -175,14 +175,14 @@ def wait_values(cells: Cells) -> Values:
 
 
 def excavator_values(cells: Cells) -> Values:
-    """Relative increase of the time by the delay."""
+    """Return the relative increase of the time by the delay."""
     late, prompt = (mean(cells[name], "movement_time_s") for name in (str(EXCAVATOR_S), "0"))
     return {"S17/increase": late / prompt - 1.0}
 
 
 # --- shown only: tracking and frame rate -----------------------------------------------------
 def tracking_values(cells: Cells) -> Values:
-    """Means over persons of what is read off their open loops."""
+    """Return means over persons of what is read off their open loops."""
     trials = cells["tracking"]
     crossover = mean(trials, "crossover_rad_s")
     margin = mean(trials, "phase_margin_deg")
@@ -190,7 +190,7 @@ def tracking_values(cells: Cells) -> Values:
 
 
 def frame_cell(rate: int, delay: float) -> str:
-    """Name of a cell."""
+    """Return the name of a cell."""
     return f"{rate}/{delay:g}"
 
 
@@ -211,7 +211,7 @@ def frame_values(cells: Cells) -> Values:
 
 
 def _parabola(x: Floats, y: Floats) -> float:
-    """R2 of the least-squares parabola; nan where nothing varies that could be explained."""
+    """Return R2 of the least-squares parabola; nan where nothing varies that could be explained."""
     if np.ptp(y) < _NOTHING:
         return math.nan
     rest = y - np.polyval(np.polyfit(x, y, 2), x)
@@ -225,12 +225,12 @@ SPEEDS_MPS = (0.0375, 0.075, 0.1125)
 
 
 def moving_cell(added: float, speed: float) -> str:
-    """Name of a cell."""
+    """Return the name of a cell."""
     return f"{added:g}/{speed:g}"
 
 
 def log_times(trials: Trials) -> Floats:
-    """Logarithm of the time of each trial `(n,)`."""
+    """Return the logarithm of the time of each trial `(n,)`."""
     return np.log(trials["movement_time_s"])
 
 
@@ -245,7 +245,7 @@ def moving_ratios(cells: Cells, added: float, speeds: Sequence[float] = SPEEDS_M
 
 
 def moving_values(cells: Cells) -> Values:
-    """Cost of lag, its convexity, differences and learning of persons, and misses."""
+    """Return the cost of lag, its convexity, differences and learning of persons, and misses."""
     logs = {added: np.log(moving_ratios(cells, added)) for added in ADDED_S}
     ratio = {added: float(np.exp(log.mean())) for added, log in logs.items()}
     slow = [cells[moving_cell(a, SPEEDS_MPS[0])] for a in (0.2, 0.0)]
@@ -266,7 +266,7 @@ def moving_values(cells: Cells) -> Values:
 
 
 def _individuals(cells: Cells) -> Values:
-    """Variances within and between persons of log times, slopes on lag, and practice."""
+    """Return variances within and between persons of log times, slopes on lag, and practice."""
     rest = []
     slopes = []
     errors = []
@@ -307,7 +307,7 @@ CLICK_S = {"0": 0.05, "0.25": 0.3}
 
 
 def click_values(cells: Cells) -> Values:
-    """Error of a single click under lag, and the cost in time."""
+    """Return the error of a single click under lag, and the cost in time."""
     off = {c: person_medians(trials, "miss_m") for c, trials in cells.items()}
     times = {c: person_medians(trials, "movement_time_s") for c, trials in cells.items()}
     return {
@@ -318,7 +318,7 @@ def click_values(cells: Cells) -> Values:
 
 # --- resisting a push: Yamagami et al. 2019 ----------------------------------------------------
 def pushed_values(cells: Cells) -> Values:
-    """Parameters of the open loops, and differences between persons."""
+    """Return parameters of the open loops, and differences between persons."""
     trials = cells["pushed"]
     frequency = person_means(trials, "crossover_rad_s")
     margins = person_means(trials, "phase_margin_deg")
@@ -339,12 +339,12 @@ SOONEST_S = 1e-3  # an operator without a reaction time has one of so much, for 
 
 
 def log_reactions(trials: Trials) -> Floats:
-    """Natural logarithms of reaction times [log s], shape `(trials,)`."""
+    """Return the natural logarithms of reaction times [log s], shape `(trials,)`."""
     return np.log(np.maximum(trials["reaction_s"], SOONEST_S))
 
 
 def heading_values(cells: Cells) -> Values:
-    """Reaction times by error, their spread, and how long the first correction grows."""
+    """Return the reaction times by error, their spread, and how long the first correction grows."""
     errors = {int(error): own for (error,), own in cells["heading"].by("heading_error_deg")}
     medians = {e: np.maximum(person_medians(t, "reaction_s"), SOONEST_S) for e, t in errors.items()}
     pulses = np.concatenate([own["pulse_s"] for own in errors.values()])
@@ -367,7 +367,7 @@ def heading_values(cells: Cells) -> Values:
 
 # --- looking: Wagenmakers et al. 2008, Colley et al. 2025, searchers, walkers ------------------
 def choice_values(cells: Cells) -> Values:
-    """Accuracy against speed: times of each person, errors of all."""
+    """Return the accuracy against speed: times of each person, errors of all."""
     times = {c: person_medians(trials, "time_s") for c, trials in cells.items()}
     errors = {c: mean(trials, "error") for c, trials in cells.items()}
     share = errors["accuracy"] / errors["speed"] if errors["speed"] else math.nan
@@ -375,13 +375,13 @@ def choice_values(cells: Cells) -> Values:
 
 
 def vehicle_values(cells: Cells) -> Values:
-    """Cost of a second vehicle for the first, by persons."""
+    """Return the cost of a second vehicle for the first, by persons."""
     logs = [person_means_of(cells[n], lambda t: np.log(t["finish_s"])) for n in ("2", "1")]
     return {"E1/ratio": float(np.exp(np.mean(logs[0] - logs[1])))}
 
 
 def look_values(cells: Cells) -> Values:
-    """Quartiles of the looks of all, and the spread of their logarithm."""
+    """Return quartiles of the looks of all, and the spread of their logarithm."""
     looks = cells["two"]["look_s"]
     looks = looks[looks > SHORTEST_LOOK_S]
     first, median, third = np.quantile(looks, [0.25, 0.5, 0.75])
@@ -393,7 +393,7 @@ SHORTEST_LOOK_S = 0.3  # what is shorter was not counted
 
 
 def alarm_values(cells: Cells) -> Values:
-    """Mean of the medians of persons."""
+    """Return the mean of the medians of persons."""
     return {"E4/opened": float(person_medians(cells["one"], "opened_s").mean())}
 
 
@@ -403,7 +403,7 @@ def item_values(cells: Cells) -> Values:
 
 
 def walker_values(cells: Cells) -> Values:
-    """Statistics of all walkers."""
+    """Return statistics of all walkers."""
     speeds = cells["street"]["speed_mps"]
     return {"G1/mean": float(speeds.mean()), "G1/sd": float(speeds.std(ddof=1))}
 
@@ -522,7 +522,7 @@ class OperatorsSetting:
 def play_exact(
     checks: Sequence[str], setting: OperatorsSetting, progress: Progress = lambda done: None
 ) -> dict[str, Found]:
-    """The value of each line of some exact checks, by its id.
+    """Return the value of each line of some exact checks, by its id.
 
     Raises:
         RunsFailed: one of them could not be simulated.
@@ -538,7 +538,7 @@ def play_experiments(
     setting: OperatorsSetting,
     progress: Progress = lambda done: None,
 ) -> dict[str, Cells]:
-    """The trials of each experiment, by its name.
+    """Return the trials of each experiment, by its name.
 
     Raises:
         ConfigError: a task cannot be read, or there is no such strategy.
@@ -559,7 +559,7 @@ def play_experiments(
 def measured(
     experiments: Sequence[Experiment], played: Mapping[str, Cells], seed: int
 ) -> dict[str, Found]:
-    """The value of each line with its interval, by its id."""
+    """Return the value of each line with its interval, by its id."""
     found: dict[str, Found] = {}
     for experiment in experiments:
         rng = Streams(seed).fresh(f"resampling/{experiment.name}")
@@ -568,18 +568,18 @@ def measured(
 
 
 def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
-    """Number of jobs in the experiments."""
+    """Return the number of jobs in the experiments."""
     return sum(len(e.cells) for e in experiments) * setting.persons
 
 
 def perform_exact(job: StudyJob) -> Tables:
-    """One exact check."""
+    """Return one exact check."""
     values = EXACT[job.config](job.seed)
     return {"rows": [{"line": line, "value": value} for line, value in values.items()]}
 
 
 def perform(job: StudyJob) -> Tables:
-    """All trials of one person in one cell."""
+    """Return all trials of one person in one cell."""
     if "population" in job.levels:
         part, cell = job.config.split("/")
         return {"rows": PARTS[part](_asked_person(job), cell, job.seed)}
@@ -587,14 +587,14 @@ def perform(job: StudyJob) -> Tables:
 
 
 def _asked_person(job: StudyJob) -> Person:
-    """Person for a job, drawn from the population that it names."""
+    """Return the person for a job, drawn from the population that it names."""
     asked = job.levels
     everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
     return draw_person(everybody, int(str(asked["population"])), job.person)
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
-    """Jobs of each cell; a person meets the same random numbers in all of them."""
+    """Return jobs of each cell; a person meets the same random numbers in all of them."""
     jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
     if experiment.scenario is None:
         traits = json.dumps(setting.traits or {})

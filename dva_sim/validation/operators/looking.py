@@ -60,7 +60,7 @@ class _Vehicle:
 
 
 def looks(person: Person, cell: str, seed: int) -> list[Row]:
-    """Every look at one of two screens on which nothing waits."""
+    """Return every look at one of two screens on which nothing waits."""
     clock = Clock()
     attention = _attention(clock, person, seed)
     screens = _Vehicle(), _Vehicle()
@@ -93,7 +93,7 @@ def vehicles(person: Person, cell: str, seed: int) -> list[Row]:
 
 
 def choices(person: Person, cell: str, seed: int) -> list[Row]:
-    """Choices between two things: what more evidence speaks for first, is said."""
+    """Return choices between two things: what more evidence speaks for first, is said."""
     noise = _normals(seed)
     rows = []
     for _ in range(TRIALS):
@@ -110,7 +110,7 @@ def choices(person: Person, cell: str, seed: int) -> list[Row]:
 
 
 def items(person: Person, cell: str, seed: int) -> list[Row]:
-    """Items beside the way of a searcher: found or not."""
+    """Return items beside the way of a searcher: found or not."""
     noise = _normals(seed)
     rows = []
     clear = clearness(ANGLE, person.habits.looking.half_seen_rad)
@@ -124,12 +124,12 @@ def items(person: Person, cell: str, seed: int) -> list[Row]:
 
 
 def alarms(person: Person, cell: str, seed: int) -> list[Row]:
-    """From a request on the screen to its picture."""
+    """Return times from a request on the screen to its picture."""
     return [{"opened_s": person.reading}]
 
 
 def walkers(person: Person, cell: str, seed: int) -> list[Row]:
-    """People on foot who are in no hurry; who is at the screen does not matter."""
+    """Return people on foot who are in no hurry; who is at the screen does not matter."""
     rng = Streams(seed).fresh("walkers")
     guard = guard_profile()
     return [{"speed_mps": Walker.draw(guard, rng).speed} for _ in range(WALKERS)]

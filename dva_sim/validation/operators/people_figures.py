@@ -21,7 +21,7 @@ ORANGE = "#D55E00"
 
 
 def draw_curves(played: Mapping[str, Cells]) -> list[Drawn]:
-    """One figure for each kind of raw data."""
+    """Return one figure for each kind of raw data."""
     curves = load_targets().curves
     with styled():
         return [
@@ -32,7 +32,7 @@ def draw_curves(played: Mapping[str, Cells]) -> list[Drawn]:
 
 
 def _people(axes: Axes, curve: CurveConfig, *, joined: bool = True) -> None:
-    """Points of people, with their intervals where these are known."""
+    """Draw points of people, with their intervals where these are known."""
     ends = (
         [np.subtract(curve.y, curve.low), np.subtract(curve.high, curve.y)] if curve.low else None
     )
@@ -50,7 +50,7 @@ def _people(axes: Axes, curve: CurveConfig, *, joined: bool = True) -> None:
 
 
 def _ours(axes: Axes, x: Sequence[float], persons: Sequence[Floats], *, log: bool = False) -> None:
-    """Means over simulated persons with 95 % intervals."""
+    """Draw means over simulated persons with 95 % intervals."""
     values = [np.log(each) if log else each for each in persons]
     means = np.array([each.mean() for each in values])
     halves = np.array([1.96 * each.std(ddof=1) / np.sqrt(len(each)) for each in values])

@@ -41,17 +41,17 @@ class Trials:
         return len(self.person)
 
     def where(self, keep: NDArray[np.bool_]) -> Trials:
-        """Those of the trials that a mask `(n,)` keeps."""
+        """Return those of the trials that a mask `(n,)` keeps."""
         return Trials(self.person[keep], {n: c[keep] for n, c in self.columns.items()})
 
     def by(self, *names: str) -> list[tuple[tuple[float, ...], Trials]]:
-        """The trials of each combination of values of some columns, in rising order."""
+        """Return the trials of each combination of values of some columns, in rising order."""
         keys = np.column_stack([self.columns[name] for name in names])
         found = np.unique(keys, axis=0)
         return [(tuple(key.tolist()), self.where((keys == key).all(axis=1))) for key in found]
 
     def drawn(self, persons: Ints) -> Trials:
-        """The trials of some persons, who count as often as they are drawn."""
+        """Return the trials of some persons, who count as often as they are drawn."""
         rows = np.concatenate([self._rows[p] for p in persons])
         number = np.concatenate([np.full(len(self._rows[p]), i) for i, p in enumerate(persons)])
         return Trials(number, {n: c[rows] for n, c in self.columns.items()})
@@ -83,12 +83,12 @@ class Found:
 
 
 def certain(value: float) -> Found:
-    """A number that rests on no persons."""
+    """Return a number that rests on no persons."""
     return Found(value, value, value)
 
 
 def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
-    """Rows of each person as columns; what is no number is left out.
+    """Return rows of each person as columns; what is no number is left out.
 
     Args:
         rows: Number of the person, and the rows.
@@ -101,7 +101,7 @@ def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
 
 
 def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> dict[str, Found]:
-    """Values of a measure with bootstrap intervals over persons.
+    """Return values of a measure with bootstrap intervals over persons.
 
     Args:
         measure: From trials to numbers.
@@ -123,7 +123,7 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
 
 
 def _middle(draws: Sequence[float]) -> tuple[float, float]:
-    """Central interval of the draws, nan excluded."""
+    """Return the central interval of the draws, nan excluded."""
     known = [draw for draw in draws if not math.isnan(draw)]
     if not known:
         return math.nan, math.nan
@@ -133,7 +133,7 @@ def _middle(draws: Sequence[float]) -> tuple[float, float]:
 
 
 def person_means(trials: Trials, name: str) -> Floats:
-    """The mean of each person `(persons,)`, without what is missing."""
+    """Return the mean of each person `(persons,)`, without what is missing."""
     values = trials[name]
     known = np.isfinite(trials[name])
     total = np.bincount(trials.person[known], values[known])
@@ -142,19 +142,19 @@ def person_means(trials: Trials, name: str) -> Floats:
 
 
 def person_means_of(trials: Trials, get: Callable[[Trials], Floats]) -> Floats:
-    """The mean of each person of something made of its trials `(persons,)`."""
+    """Return the mean of each person of something made of its trials `(persons,)`."""
     values = get(trials)
     return np.asarray(np.bincount(trials.person, values) / np.bincount(trials.person))
 
 
 def person_medians(trials: Trials, name: str) -> Floats:
-    """The median of each person `(persons,)`."""
+    """Return the median of each person `(persons,)`."""
     values = trials[name]
     return np.array([np.nanmedian(values[trials.person == p]) for p in np.unique(trials.person)])
 
 
 def mean(trials: Trials, name: str) -> float:
-    """The mean over persons of their means."""
+    """Return the mean over persons of their means."""
     means = person_means(trials, name)
     return float(means.mean()) if len(means) else float("nan")
 

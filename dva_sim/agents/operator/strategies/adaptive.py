@@ -64,7 +64,7 @@ class Corrections:
         return 0.5 * self._habits.grows_s * self._tempo
 
     def steer(self, now: float, wanted: float) -> float:
-        """The turn rate to ask for, if so much is wanted now [rad/s]."""
+        """Return the turn rate to ask for, if so much is wanted now [rad/s]."""
         grows = self._habits.grows_s * self._tempo
         share = (now - self._begun) / grows
         if share >= 1.0:
@@ -192,11 +192,11 @@ class Adaptive(Strategy):
         return closed / waiting * self._unease(delay)
 
     def _unease(self, delay: float) -> float:
-        """By what factor a person takes acting on such a late picture to be worse than it is."""
+        """Return the factor by which acting on such a late picture seems worse than it is."""
         return delay / (self._habits.driven * self.person.waits_from)
 
     def _waiting(self, way: float, moves: float, delay: float) -> float:
-        """Expected time to finish by so many moves, each with its wait [s]."""
+        """Return the expected time to finish by so many moves, each with its wait [s]."""
         a_move = max(self._habits.shortest_s, self.period.value)
         return way / self._most + moves * (a_move + self._moves.moves.usual_wait(delay))
 

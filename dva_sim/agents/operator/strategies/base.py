@@ -134,12 +134,12 @@ class GuardedStrategy(Guard, Strategy):
         return Intent(speed, self._held("wants [rad/s]", turn, -most, most))
 
     def point(self, view: PointView) -> Velocity:
-        """No faster than the cursor can."""
+        """Return the velocity to a point, no faster than the cursor can."""
         got = self._answer(self.strategy.point, view) or (0.0, 0.0)
         return slowed(*got, self.reach.speed)
 
     def follow(self, view: PathView) -> Velocity:
-        """No faster than the cursor can."""
+        """Return the velocity that follows a target, no faster than the cursor can."""
         got = self._answer(self.strategy.follow, view) or (0.0, 0.0)
         return slowed(*got, self.reach.speed)
 

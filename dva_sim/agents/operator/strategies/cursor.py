@@ -54,7 +54,7 @@ class Sighting(NamedTuple):
 def towards(
     seen: Sighting, delay: float, person: Person, most: float, margin: float | None = None
 ) -> Velocity:
-    """Crossover law: the velocity of the target as seen, and the error times a gain.
+    """Return the crossover law: the velocity of the target as seen, and the error times a gain.
 
     Args:
         seen: The newest frame.
@@ -70,7 +70,7 @@ def towards(
 
 
 def through(path: Route, seen: Sighting, delay: float, person: Person, most: float) -> Velocity:
-    """Along the tunnel as it will be where one is when it takes effect, and back to its middle.
+    """Return the velocity along the tunnel, steered back to the middle of where one will be.
 
     While nothing can be seen of it, the noise of the hand drives the cursor aside, and so does a
     bend that is not foreseen well; the speed keeps each within a share of the half width, the
@@ -108,7 +108,7 @@ def slowed(vx: float, vy: float, most: float) -> Velocity:
 
 
 def fastest(half_width: float, delay: float, person: Person, most: float) -> float:
-    """The speed at which the noise of the hand, during the delay, takes up the person's caution.
+    """Return the speed at which noise of the hand, during the delay, takes up the caution.
 
     Args:
         half_width: Half-width of the tunnel [m].

@@ -30,7 +30,10 @@ STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
 
 
 def _guarded(made: Driver) -> Driver:
-    """One of a user's, kept within the limits; its class may make something else of itself."""
+    """Return one of a user's, kept within the limits.
+
+    Its class may make something else of itself.
+    """
     if not isinstance(made, Strategy):
         raise ConfigError(f"returns {type(made).__name__}, not an operator")
     return GuardedStrategy(made)
@@ -89,7 +92,7 @@ def load_strategy(
 
 
 def _load_used(option: str, name: object, person: Person, reach: Reach) -> Strategy:
-    """Strategy that another one uses, by an option of that name.
+    """Return the strategy that another one uses, by an option of that name.
 
     Raises:
         ConfigError: it is none, or it sees nothing.

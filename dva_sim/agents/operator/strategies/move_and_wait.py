@@ -58,7 +58,7 @@ class Moves:
         return not self._parts
 
     def halt(self, now: float, peak: float) -> None:
-        """Something moves that was no move of this kind: let go at `now` [s], and wait."""
+        """Wait after a motion that was no move of this kind: let go at `now` [s]."""
         self.waits += 1
         self._parts = []
         self._peak = peak
@@ -228,7 +228,10 @@ class MoveAndWait(Strategy):
     def _way(
         self, route: Route, seen: Observation, left: float, stop_before: float
     ) -> list[MovePart]:
-        """The next move of a robot, with so much way left [m]; none where it has come to stay."""
+        """Return the next move of a robot, with so much way left [m].
+
+        None where it has come to stay.
+        """
         here = (seen.x, seen.y)
         turns = self.reach.radius == 0.0
         go = left - stop_before
@@ -245,13 +248,13 @@ class MoveAndWait(Strategy):
         return [self._curve(ahead)]
 
     def _turn(self, angle: float) -> MovePart:
-        """On the spot by an angle [rad]."""
+        """Return a turn on the spot by an angle [rad]."""
         most = self._in_curves * self.reach.turn_rate
         lasts = self._lasting(abs(angle), most)
         return (lasts, *self.reach.turn(angle / lasts))
 
     def _curve(self, ahead: Ahead) -> MovePart:
-        """On an arc to a place ahead, no sharper than the robot can."""
+        """Return an arc to a place ahead, no sharper than the robot can."""
         curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, self._habits.least_m)
         if self.reach.radius > 0.0:
             most = 1.0 / self.reach.radius
@@ -263,7 +266,7 @@ class MoveAndWait(Strategy):
         return lasts, speed, curvature * speed
 
     def _straight(self, now: float, dx: float, dy: float) -> Velocity:
-        """A move of a cursor by so much [m]."""
+        """Return a move of a cursor by so much [m]."""
         lasts = self._lasting(math.hypot(dx, dy), self._most)
         vx = dx / lasts
         vy = dy / lasts

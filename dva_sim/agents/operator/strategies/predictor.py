@@ -87,7 +87,7 @@ class Predictor(Strategy):
         return (1.0 - self._quality) * delay
 
     def _moved_on(self, seen: Observation, now: float, delay: float) -> Observation:
-        """The robot as it will be once what was asked for has happened."""
+        """Return the robot as it will be once what was asked for has happened."""
         x = seen.x
         y = seen.y
         heading = seen.heading

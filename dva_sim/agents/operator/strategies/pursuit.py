@@ -85,7 +85,7 @@ class TwoPoint(Pursuit):
     def _correct(
         self, route: Route, view: View, ahead: Ahead, look: float, speed: float, passed: float
     ) -> None:
-        """One correction, `passed` [s] after the last one."""
+        """Correct once, `passed` [s] after the last correction."""
         seen = view.seen
         person = self.person
         x, y = route.point_at(route.length - ahead.remaining + look * NEAR_TIME / FAR_TIME)

@@ -41,7 +41,7 @@ STEEPNESS = 6.0  # design: of the share of movements that are waited for; person
 
 
 def waited_share(delay: float, patience: float) -> float:
-    """Share of its movements after which a person waits to see what came of them.
+    """Return the share of its movements after which a person waits to see what came of them.
 
     Args:
         delay: Beyond the usual one, as it is felt [s].
@@ -51,7 +51,7 @@ def waited_share(delay: float, patience: float) -> float:
 
 
 def _course(share: float) -> float:
-    """Part of the way of a movement with the least jerk, by the part of its time."""
+    """Return the part of the way of a movement with the least jerk, by the part of its time."""
     share = min(max(share, 0.0), 1.0)
     return share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
 
@@ -103,7 +103,7 @@ class Submovements:
         self.waited = self.total = 0.0
 
     def point(self, now: float, seen: Sighting, delay: float, noise: Iterator[float]) -> Velocity:
-        """Velocity to ask for [m/s]; a target that moves is followed all the time.
+        """Return the velocity to ask for [m/s]; a target that moves is followed all the time.
 
         Args:
             now: [s]
@@ -169,7 +169,7 @@ class Submovements:
     def _plan(
         self, now: float, dx: float, dy: float, tolerance: float, noise: Iterator[float]
     ) -> None:
-        """A movement by so much, which misses by a share of it; the target's own is added."""
+        """Plan a movement by so much, which misses by a share of it; the target's own is added."""
         habits = self._habits
         off = math.hypot(dx, dy)
         along = habits.misses * next(noise)
@@ -194,7 +194,7 @@ class Submovements:
         return share * self._way[0], share * self._way[1]
 
     def _predicted(self, now: float, seen: Sighting, counted: float) -> Velocity:
-        """The cursor [m] once everything that was asked for has happened.
+        """Return the cursor [m] once everything that was asked for has happened.
 
         The hand follows what is asked for with a lag that the person knows: what was asked for
         longer ago than the rest of the delay is seen but for the share that the hand still lacks.

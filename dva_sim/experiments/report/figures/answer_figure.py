@@ -43,7 +43,7 @@ class AnswerFigure(style.ReportFigure):
         )
 
     def contrast(self, finding: Finding, differences: Floats) -> style.Drawn | None:
-        """The difference alone; None where no interval can be given.
+        """Return the difference alone; None where no interval can be given.
 
         Args:
             finding: The answer.
@@ -93,7 +93,7 @@ class AnswerFigure(style.ReportFigure):
 
 
 def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
-    """A bar for the band, a mark for the mean: what it tells is its filling, named in a key."""
+    """Draw a bar for the band and a mark for the mean, whose filling a key explains."""
     from matplotlib.lines import Line2D
 
     x = np.arange(len(f.mean))
@@ -121,7 +121,7 @@ def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
 
 
 def _too_small(ax: Axes, f: Finding) -> bool:
-    """Grey where a difference was declared too small to matter, if that can be seen."""
+    """Return the grey where a difference was declared too small to matter, if that can be seen."""
     bottom, top = ax.get_ylim()
     if f.smallest_effect is None or f.smallest_effect < _LEAST_SHARE * (top - bottom):
         return False
@@ -131,7 +131,7 @@ def _too_small(ax: Axes, f: Finding) -> bool:
 
 
 def _values(ax: Axes, f: Finding) -> None:
-    """Each mean in figures, beside its mark."""
+    """Write each mean in figures, beside its mark."""
     if len(f.mean) > _MOST_LABELS:
         return
     there = present(f.mean)

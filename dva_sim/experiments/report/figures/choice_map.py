@@ -90,7 +90,7 @@ def _paint(ax: Axes, found: ChoiceMap) -> None:
 
 
 def _place(found: ChoiceMap, situation: int, choice: int) -> tuple[int, int]:
-    """Column and row of a cell."""
+    """Return the column and row of a cell."""
     return (situation, choice) if found.is_tall else (choice, situation)
 
 
@@ -115,7 +115,10 @@ def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bo
 
 
 def _shade(found: ChoiceMap, worst: float, is_plain: bool) -> float:
-    """Strength of the colour, by the logarithm of the regret; none where none was shown."""
+    """Return the strength of the colour, by the logarithm of the regret.
+
+    None where none was shown.
+    """
     least = max(found.smallest, 1e-9)
     if is_plain or worst <= least:
         return 0.0

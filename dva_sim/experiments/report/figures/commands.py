@@ -54,7 +54,7 @@ class CommandAge(style.ReportFigure):
 
 
 def _cell_means(values: Floats) -> Floats:
-    """`(stops, persons, trials)` to means over all runs of a stop."""
+    """Return `(stops, persons, trials)` to means over all runs of a stop."""
     return nan_mean(values.reshape(len(values), -1), axis=1)
 
 
@@ -111,7 +111,7 @@ class Brought(style.ReportFigure):
 
 
 def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
-    """Means over persons and the middle 90 % of them, in the units of the table of runs."""
+    """Return means over persons and the middle 90 % of them, in the units of the table of runs."""
     numbers = Numbers()
     panel = view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
@@ -144,7 +144,7 @@ def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
 
 
 def _middle(values: Floats) -> Floats:
-    """Ends of the middle 90 % of persons at each stop: `(2, stops)`."""
+    """Return ends of the middle 90 % of persons at each stop: `(2, stops)`."""
     found = np.full((2, values.shape[1]), np.nan)
     there = np.isfinite(values).any(axis=0)
     found[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
@@ -152,7 +152,7 @@ def _middle(values: Floats) -> Floats:
 
 
 def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
-    """Means over persons of `values` `(persons, stops)`, with the middle 90 % of them."""
+    """Draw means over persons of `values` `(persons, stops)`, with their middle 90 %."""
     means = nan_mean(values, axis=0)
     stops = np.flatnonzero(np.isfinite(means))
     if not len(stops):

@@ -26,7 +26,7 @@ class Numbers:
         self._rows: list[dict[str, Any]] = []
 
     def add(self, where: Mapping[str, Any], columns: Mapping[str, Iterable[Any]]) -> None:
-        """One row for each entry of the columns, which are of one length.
+        """Add one row for each entry of the columns, which are of one length.
 
         Args:
             where: Levels and names that hold for all these rows.
@@ -36,11 +36,11 @@ class Numbers:
             self._rows.append(dict(where) | dict(zip(columns, row, strict=True)))
 
     def row(self, where: Mapping[str, Any], **columns: Any) -> None:
-        """A single row."""
+        """Add a single row."""
         self._rows.append(dict(where) | columns)
 
     def csv(self) -> bytes:
-        """Comma-separated, with a heading; what is missing is left empty."""
+        """Return the comma-separated, with a heading; what is missing is left empty."""
         heads = list(dict.fromkeys(key for row in self._rows for key in row))
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -50,7 +50,7 @@ class Numbers:
 
 
 def with_unit(word: str, measure: str) -> str:
-    """`mean_s` for the mean of a measure in seconds."""
+    """Return `mean_s` for the mean of a measure in seconds."""
     ending = ending_of(measure)
     return f"{word}_{ending}" if ending else word
 
@@ -61,7 +61,7 @@ def in_units(measure: str, **columns: Any) -> dict[str, Any]:
 
 
 def with_limits(column: str, middle: Any, low: Any, high: Any) -> dict[str, Any]:
-    """A column with its limits: `response_s`, `response_low_s` and `response_high_s`."""
+    """Return a column with its limits: `response_s`, `response_low_s` and `response_high_s`."""
     stem = column.removesuffix(f"_{ending_of(column)}")
     return {column: middle} | in_units(column, **{f"{stem}_low": low, f"{stem}_high": high})
 

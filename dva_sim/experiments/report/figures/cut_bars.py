@@ -68,7 +68,7 @@ class Bars:
 
 
 def mark_cuts(every: Sequence[Bars]) -> None:
-    """An arrow head where an edge of the axes cuts a bar, with the bound that cannot be seen.
+    """Draw an arrow head where an edge of the axes cuts a bar, with the bound out of sight.
 
     To be called last: the limits must be settled.
     """
@@ -85,7 +85,7 @@ def mark_cuts(every: Sequence[Bars]) -> None:
 
 
 def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: str) -> None:
-    """At an edge; of several bounds at one stop one stands below the other."""
+    """Draw an arrow head at an edge; of several bounds at one stop one stands below the other."""
     look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
     if bars.along == "y":
         place = (at, edge)

@@ -69,7 +69,7 @@ class DelayBudget(style.ReportFigure):
 
 
 def stages_of(view: StudyView) -> dict[str, Floats]:
-    """Each stage run by run, in the order of the loop; their sum is that of the columns.
+    """Return each stage run by run, in the order of the loop; their sum is that of the columns.
 
     While a request is open no command goes: the phone's newer ones are replaced by the newest. So
     the command in force stands longer than the phone's own period, which is the pattern's doing
@@ -96,7 +96,7 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
 
 
 def _driven(view: StudyView, grid: Floats) -> StudyView:
-    """Without the lines under which nobody drove, such as guards without robots."""
+    """Return the view without lines under which nobody drove, such as guards without robots."""
     if view.line is None:
         return view
     name = view.line.name
@@ -105,13 +105,13 @@ def _driven(view: StudyView, grid: Floats) -> StudyView:
 
 
 def _means(view: StudyView, grid: Floats, panel: Setting, level: Level) -> Floats:
-    """Over all runs of each stop."""
+    """Return means over all runs of each stop."""
     values = view.curve(grid, panel, level)
     return nan_mean(values.reshape(len(values), -1), axis=1)
 
 
 def _parts(stages: list[str]) -> dict[str, Artist]:
-    """For the key, in the order of the stack."""
+    """Return the parts for the key, in the order of the stack."""
     from matplotlib.lines import Line2D
 
     mark = Line2D([], [], marker="D", ms=4.5, ls="", color=PAPER, mec=INK)
@@ -174,7 +174,7 @@ class Stacks:
         self._label = label
 
     def panels(self) -> Iterator[tuple[Axes, Setting, Level]]:
-        """Each panel with its setting and line."""
+        """Yield each panel with its setting and line."""
         view = self._view
         places = ((panel, level) for panel in view.shown for level in view.lines)
         for ax, (panel, level) in zip(self.axes, places, strict=True):
@@ -198,7 +198,7 @@ class Stacks:
 
 
 def stack(ax: Axes, parts: Mapping[str, Floats], fills: Mapping[str, Fill]) -> None:
-    """Parts `(stops,)` on end; those that are zero everywhere take no place."""
+    """Stack parts `(stops,)` on end; those that are zero everywhere take no place."""
     floor: Floats = np.zeros(len(next(iter(parts.values()))))
     for name, values in parts.items():
         top = floor + np.nan_to_num(values)
@@ -208,7 +208,7 @@ def stack(ax: Axes, parts: Mapping[str, Floats], fills: Mapping[str, Fill]) -> N
 
 
 def _bars(ax: Axes, floor: Floats, top: Floats, fill: Fill) -> None:
-    """A bar at each stop, from `floor` to `top` `(stops,)`: one artist for all of them."""
+    """Draw a bar at each stop, from `floor` to `top` `(stops,)`: one artist for all of them."""
     from matplotlib.collections import PolyCollection
 
     low = np.arange(len(floor)) - _HALF
@@ -223,7 +223,7 @@ def _bars(ax: Axes, floor: Floats, top: Floats, fill: Fill) -> None:
 
 
 def _along_y(ax: Axes, over: Factor | None, is_first: bool) -> None:
-    """The stops, the first on top."""
+    """Draw the stops along y, the first on top."""
     if over is None:
         ax.set_yticks([])
         ax.set_ylim(0.5, -0.5)

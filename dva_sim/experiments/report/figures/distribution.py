@@ -73,7 +73,7 @@ class Distributions(style.ReportFigure):
 
 
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
-    """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
+    """Return the runs of a cell that gave a value, with who drove and whether it was confirmed."""
     part = view.part
     there = np.isfinite(values)
     columns = {
@@ -87,7 +87,7 @@ def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str
 def _dots(
     ax: Axes, offset: float, width: float, values: Floats, ok: NDArray[np.bool_], look: Look
 ) -> None:
-    """Every run `(stops, runs)` as a dot, side by side with the others of its stop."""
+    """Draw every run `(stops, runs)` as a dot, side by side with the others of its stop."""
     stops, runs = values.shape
     spots = width * ((np.arange(runs) * _GOLDEN) % 1 - 0.5)  # even, and the same every time
     x = np.arange(stops)[:, np.newaxis] + offset + spots
@@ -105,7 +105,7 @@ def _dots(
 
 
 def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
-    """Median and middle half of each stop `(stops, runs)`, where there are runs enough for them."""
+    """Draw median and middle half of each stop `(stops, runs)` with runs enough for them."""
     stops = np.flatnonzero(np.isfinite(values).sum(axis=1) >= _FEWEST)
     if not len(stops):
         return

@@ -85,7 +85,7 @@ def _few_words(reading: Reading) -> str:
 def _curves(
     view: StudyView, lines: tuple[Level, ...], baseline: Level, ylabel: str
 ) -> tuple[Figure, list[Axes], list[Ends], list[Bars], str, Numbers]:
-    """A panel for each setting, in it a line with its band for each level, and where it ends.
+    """Draw a panel for each setting, and in it a line with its band for each level.
 
     Args:
         lines: Levels drawn.
@@ -132,13 +132,13 @@ def _curves(
 
 
 def _possible(bands: Band, least: float, most: float) -> Band:
-    """Its limits within what is possible."""
+    """Return its limits within what is possible."""
     edges = ("low", "high", "pointwise_low", "pointwise_high")
     return replace(bands, **{edge: np.clip(getattr(bands, edge), least, most) for edge in edges})
 
 
 def _places(bands: Band, shift: float) -> Floats:
-    """Along x, beside each stop."""
+    """Return places along x, beside each stop."""
     return np.arange(len(bands.mean), dtype=np.float64) + shift
 
 
@@ -166,7 +166,10 @@ def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
 
 
 def _side_by_side(view: StudyView, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
-    """Each level's place beside its stop; close together where a line goes on to the next."""
+    """Return each level's place beside its stop.
+
+    Close together where a line goes on to the next.
+    """
     if not style.has_lines(view):
         return style.dodge(lines)
     return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
@@ -183,7 +186,7 @@ def _intervals_words(view: StudyView) -> str:
 def _name(
     view: StudyView, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
 ) -> None:
-    """Lines are named at their ends, marks in a key."""
+    """Name lines at their ends, and marks in a key."""
     if style.has_lines(view):
         name_lines(axes, ends, view.line)
     elif view.line is not None:
@@ -191,7 +194,7 @@ def _name(
 
 
 def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
-    """A mark with two bars at each stop: the wide interval thin, the narrow one thick."""
+    """Return a mark with two bars at each stop: the wide interval thin, the narrow one thick."""
     x = _places(bands, shift)
     ax.vlines(x, bands.low, bands.high, color=look.colour, lw=1)
     ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=look.colour, lw=2.6)
@@ -200,7 +203,7 @@ def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
 
 
 def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
-    """One line with its band and bars; gives the height of its end."""
+    """Return one line with its band and bars; gives the height of its end."""
     x = _places(bands, shift)
     colour = look.colour
     ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
@@ -211,7 +214,10 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
 
 
 def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
-    """Cadence of each panel shown; None unless delay and a waiting pattern are varied."""
+    """Return the cadence of each panel shown.
+
+    None unless delay and a waiting pattern are varied.
+    """
     waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
     if view.over is None or view.over.name != "link.delay_s" or not waits:
         return [None for _ in view.shown]
@@ -219,7 +225,7 @@ def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | Non
 
 
 def boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
-    """Position on x where the wanted rate becomes too high; None if outside the levels.
+    """Return the position on x where the wanted rate becomes too high; None if outside the levels.
 
     Where places are not to scale, between two levels is the middle between them.
     """
@@ -230,7 +236,7 @@ def boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None) -> None:
-    """The delay from which request/reply must fall behind the wanted rate."""
+    """Mark the delay from which request/reply must fall behind the wanted rate."""
     place = boundary(over, cadence)
     if place is None or over is None or cadence is None:
         return
@@ -269,7 +275,7 @@ class Cadence:
 
 
 def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadence | None:
-    """The cadence of a scenario under some levels; None where its profile is not to be had.
+    """Return the cadence of a scenario under some levels; None where its profile is not to be had.
 
     A phone that looks only when its batch is full or its time is up wants no more than that.
     """

@@ -102,7 +102,7 @@ def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[st
 def stack_in_time(
     ax: Axes, shares: dict[str, Floats], times: Floats, fills: Mapping[str, Fill] = FATES
 ) -> None:
-    """Shares that add up to one, one above the other."""
+    """Stack shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
     for way, share in shares.items():
         fill = fills[way]

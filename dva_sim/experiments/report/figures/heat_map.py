@@ -123,7 +123,7 @@ def _field(
 
 
 def _second(view: StudyView) -> Factor | None:
-    """The other factor with most levels; of equal ones a quantity first."""
+    """Return the other factor with most levels; of equal ones a quantity first."""
     if view.line is None or view.over is None or len(view.over.levels) < 2:
         return None
     others = [f for f in view.part.factors if f not in (view.line, view.over)]
@@ -132,7 +132,7 @@ def _second(view: StudyView) -> Factor | None:
 
 
 def _colours(ax: Axes, shown: Floats, reach: float) -> QuadMesh:
-    """Fields from purple, below zero, over white to orange: far apart for every eye."""
+    """Return fields from purple, below zero, over white to orange: far apart for every eye."""
     return ax.pcolormesh(
         *np.meshgrid(np.arange(shown.shape[1] + 1) - 0.5, np.arange(shown.shape[0] + 1) - 0.5),
         np.ma.masked_invalid(shown),
@@ -145,7 +145,7 @@ def _colours(ax: Axes, shown: Floats, reach: float) -> QuadMesh:
 
 
 def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
-    """Numbers and marks: no colour is needed to read them, nor is it in a print."""
+    """Write numbers and marks: no colour is needed to read them, nor is it in a print."""
     for (y, x), mean in np.ndenumerate(field.mean):
         if not np.isfinite(mean):
             continue
@@ -167,7 +167,7 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
 
 
 def _contours(ax: Axes, field: EffectField) -> bool:
-    """The line of no effect with those of the band's edges; whether there is one."""
+    """Return the line of no effect with those of the band's edges; whether there is one."""
     has_zero = False
     for values, dashes, width in (
         (field.mean, "-", 2.2),

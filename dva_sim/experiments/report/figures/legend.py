@@ -33,7 +33,7 @@ Ends = dict[Level, float]  # where each line ends
 
 
 def key(figure: Figure, handles: Sequence[Artist], names: Sequence[str]) -> None:
-    """Above all panels, in as many lines as it takes, to be read line by line."""
+    """Draw the key above all panels, in as many lines as it takes, to be read line by line."""
     columns = columns_of([len(name) for name in names])
     order = [i for column in range(columns) for i in range(column, len(names), columns)]
     figure.legend(
@@ -46,13 +46,13 @@ def key(figure: Figure, handles: Sequence[Artist], names: Sequence[str]) -> None
 
 
 def key_height(names: Sequence[str]) -> float:
-    """Height that a legend needs in a figure [in]."""
+    """Return the height that a legend needs in a figure [in]."""
     columns = columns_of([len(name) for name in names])
     return _ROW * -(-len(names) // columns)
 
 
 def columns_of(lengths: Sequence[int]) -> int:
-    """Number of columns that fit, each as wide as its longest name."""
+    """Return the number of columns that fit, each as wide as its longest name."""
     for columns in range(len(lengths), 1, -1):
         if sum(max(lengths[c::columns]) + _HANDLE for c in range(columns)) <= _LINE:
             return columns
@@ -60,7 +60,7 @@ def columns_of(lengths: Sequence[int]) -> int:
 
 
 def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None = None) -> None:
-    """The mark of each level, or of some, where marks are too many to be named one by one."""
+    """Draw the mark of each level, or of some, where marks are too many to be named one by one."""
     from matplotlib.lines import Line2D
 
     if factor is None:
@@ -72,7 +72,7 @@ def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None
 
 
 def box(fill: Fill) -> Artist:
-    """A handle for what a surface stands for."""
+    """Return a handle for what a surface stands for."""
     from matplotlib.patches import Patch
 
     return Patch(facecolor=fill.colour, hatch=fill.hatch, edgecolor=PAPER, lw=0.5)
@@ -110,7 +110,10 @@ def name_lines(axes: Sequence[Axes], ends: Sequence[Ends], factor: Factor | None
 
 
 def _in_axes(axes: Axes, ends: Ends) -> Ends:
-    """Heights as fractions of the axes, from the lowest up; lines without an end are left out."""
+    """Return heights as fractions of the axes, from the lowest up.
+
+    Lines without an end are left out.
+    """
     edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
     bottom = float(edges[0, 1])
     top = float(edges[1, 1])

@@ -134,7 +134,10 @@ STAGES: Mapping[str, Fill] = {
 
 
 def looks(factor: Factor | None) -> dict[Level, Look]:
-    """A look for each level: one's own, wherever it appears, or one that no other here has."""
+    """Return a look for each level.
+
+    One's own, wherever it appears, or one that no other here has.
+    """
     if factor is None:
         return {None: ONE}
     own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
@@ -146,12 +149,12 @@ def looks(factor: Factor | None) -> dict[Level, Look]:
 
 
 def colours(factor: Factor | None) -> dict[Level, str]:
-    """A colour for each level."""
+    """Return a colour for each level."""
     return {level: look.colour for level, look in looks(factor).items()}
 
 
 def is_of_palette(colour: str) -> bool:
-    """True if a colour, as `#rrggbb`, may be used in figures."""
+    """Return True if a colour, as `#rrggbb`, may be used in figures."""
     own = [INK, SOFT, FAINT, WARNING, HAZARD, "#ffffff", *(look.colour for look in LOOKS)]
     fills = [fill.colour for kind in (FATES, STAGES) for fill in kind.values()]
     return colour.lower() in {known.lower() for known in (*own, *fills)}

@@ -56,7 +56,7 @@ def draw_all(reading: Reading) -> list[Drawn]:
 
 
 def _drawn(figure: ReportFigure, view: StudyView, reading: Reading) -> list[Drawn]:
-    """The one figure, if there is anything to be seen."""
+    """Return the one figure, if there is anything to be seen."""
     if not figure.applies(view, reading):
         return []
     with styled():

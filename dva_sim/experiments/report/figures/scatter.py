@@ -61,7 +61,7 @@ class Points(NamedTuple):
 
 
 def points_of(view: StudyView, reading: Reading) -> Points:
-    """The runs of a design of points in ranges."""
+    """Return the runs of a design of points in ranges."""
     names = reading.points
     part = part_of(reading.study, reading.runs, view.part.name, are_points_trials=False)
     panel = view.panels[0] | ({view.over.name: view.stops[-1]} if view.over else {})
@@ -70,14 +70,14 @@ def points_of(view: StudyView, reading: Reading) -> Points:
 
 
 def _per_point(part: RunGrid, column: str, setting_: Setting) -> Floats:
-    """A column `(points, ...)`, the other factors at some levels, everything else flat."""
+    """Return a column `(points, ...)`, the other factors at some levels, everything else flat."""
     axis = [f.name for f in part.factors if f.name not in setting_].index(POINT)
     grid = np.moveaxis(part.where(part.grid(column), setting_), axis, 0)
     return grid.reshape(len(grid), -1)
 
 
 def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
-    """Each line, or the contrast of two of them if one was declared."""
+    """Return each line, or the contrast of two of them if one was declared."""
     grid = part.outcome(view.measure)
 
     def at(level: Level) -> Floats:
@@ -98,7 +98,7 @@ class Scatter(style.ReportFigure):
     pages = ("driving",)
 
     def applies(self, view: StudyView, reading: Reading) -> bool:
-        """Only for designs of points in ranges."""
+        """Return True only for designs of points in ranges."""
         return super().applies(view, reading) and bool(reading.points)
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
@@ -137,7 +137,7 @@ def _what(view: StudyView, clouds: list[Cloud]) -> str:
 
 
 def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
-    """Points, and the means of as many equal parts of them as there are enough for."""
+    """Draw points, and the means of as many equal parts of them as there are enough for."""
     there = np.isfinite(x) & np.isfinite(y)
     x = x[there]
     y = y[there]
@@ -150,7 +150,7 @@ def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
 
 
 def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Means of equally many points each, in order of x, with half their 95 % intervals.
+    """Return means of equally many points each, in order of x, with half their 95 % intervals.
 
     The points of a part differ by all other factors, as drawn: their scatter is what the interval
     is made of. Three empty arrays where there are too few.

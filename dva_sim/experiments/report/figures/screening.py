@@ -65,7 +65,7 @@ def _draw(found: Screening, label: str, path: Path) -> None:
 
 
 def _called(number: Assumption) -> str:
-    """The name of a number without what all names have in common."""
+    """Return the name of a number without what all names have in common."""
     parts = number.key.removesuffix(".median").split(".")
     words = [part for part in parts[1:] if part not in ("habits", "traits")]
     name = factor_name(number.key) if len(parts) < 2 else without_unit(words[-1])

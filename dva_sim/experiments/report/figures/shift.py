@@ -38,7 +38,7 @@ class ShiftFigure(ReportFigure):
 
     @abstractmethod
     def drawn(self, shifts: Shifts) -> Drawn | None:
-        """The figure; None where there is nothing to be seen."""
+        """Return the figure; None where there is nothing to be seen."""
 
 
 def _looks(shifts: Shifts) -> dict[Level, Look]:
@@ -68,7 +68,7 @@ class Trade(ShiftFigure):
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
-    """Response over another measure, both better where smaller."""
+    """Return the response over another measure, both better where smaller."""
     across = shifts.means(column)
     response = shifts.means("response_mean_s")
     figure, (axes,) = panels(1, len(shifts.stops), 4.0)
@@ -100,7 +100,7 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
 
 
 def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
-    """Means, and ends of bars: the interval of the difference against the baseline."""
+    """Return means, and ends of bars: the interval of the difference against the baseline."""
     numbers = Numbers()
     columns = dict[str, Any]()
     for name in ("response_mean_s", column):
@@ -120,7 +120,7 @@ def _half_widths(shifts: Shifts, column: str) -> Any:
 
 
 def _frontier(ax: Axes, x: Any, y: Any) -> None:
-    """A line through those that no other beats on both."""
+    """Draw a line through those that no other beats on both."""
     best = [
         i
         for i in range(len(x))
@@ -172,7 +172,7 @@ class WayToBest(ShiftFigure):
 
 
 def _policy_axis(ax: Axes, names: tuple[str, ...], title: str) -> None:
-    """A row for each policy, the first on top."""
+    """Draw a row for each policy, the first on top."""
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(len(names) - 0.5, -0.5)
     ax.grid(True, axis="both")

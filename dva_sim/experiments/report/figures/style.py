@@ -97,7 +97,7 @@ class Drawn:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """The look of the report, for as long as the block lasts."""
+    """Apply the look of the report for as long as the block lasts."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -109,7 +109,7 @@ def styled() -> Iterator[None]:
 def panels(
     rows: int, columns: int, height: float, **options: Any
 ) -> tuple[Figure, list[list[Axes]]]:
-    """A grid of axes in the report's width; `height` per row [in]."""
+    """Return a grid of axes in the report's width; `height` per row [in]."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height * rows), dpi=150, layout="constrained")
@@ -120,7 +120,7 @@ def panels(
 def places(
     count: int, abreast: int, height: float, **options: Any
 ) -> tuple[Figure, list[list[Axes]], list[Axes]]:
-    """Axes for so many panels, some abreast: the grid, and the panels that are seen."""
+    """Return axes for so many panels, some abreast: the grid, and the panels that are seen."""
     figure, grid = panels(-(-count // abreast), abreast, height, **options)
     flat = [ax for row in grid for ax in row]
     for ax in flat[count:]:
@@ -129,7 +129,7 @@ def places(
 
 
 def lying(axes: Axes) -> None:
-    """Values run along x, so that is where lines of the grid help."""
+    """Let values run along x, so that is where lines of the grid help."""
     axes.grid(axis="x", visible=True)
     axes.grid(axis="y", visible=False)
 
@@ -184,19 +184,19 @@ def _name_logarithmic(figure: Figure) -> None:
 
 
 def axis_label(name: str, text: str | None = None) -> str:
-    """A measure or factor with its unit in brackets."""
+    """Return a measure or factor with its unit in brackets."""
     unit = unit_of(name)
     words = capital(text or measure_name(name))
     return f"{words} [{unit}]" if unit else words
 
 
 def wrapped(text: str, width: int = 38) -> str:
-    """Text in lines of at most `width` characters."""
+    """Return the text in lines of at most `width` characters."""
     return "\n".join(textwrap.wrap(text, width))
 
 
 def stops_axis(axes: Axes, over: Factor | None) -> None:
-    """The factor along x, level beside level: 0 to 1 s are all readable."""
+    """Draw the factor along x, level beside level: 0 to 1 s are all readable."""
     if over is None:
         axes.set_xticks([])
         axes.set_xlim(-0.5, 0.5)
@@ -215,7 +215,7 @@ def stops_axis(axes: Axes, over: Factor | None) -> None:
 
 
 def level_axis(axes: Axes, factor: Factor, width: int = _ROW_LABEL) -> None:
-    """A factor along y, level above level, names in lines of at most `width` characters."""
+    """Draw a factor along y, level above level, names in lines of at most `width` characters."""
     names, unit = tick_names(factor)
     axes.set_yticks(range(len(names)), [wrapped(name, width) for name in names])
     axes.set_ylabel(_factor_label(factor, unit))
@@ -223,13 +223,13 @@ def level_axis(axes: Axes, factor: Factor, width: int = _ROW_LABEL) -> None:
 
 
 def _factor_label(factor: Factor, unit: str) -> str:
-    """With its unit, and whether its levels are as far apart as their places."""
+    """Return the label with its unit, and whether levels are as far apart as their places."""
     scale = "" if is_to_scale(factor) else ", not to scale"
     return f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}{scale}"
 
 
 def is_to_scale(factor: Factor) -> bool:
-    """True if the levels are equally spaced; always true of words."""
+    """Return True if the levels are equally spaced; always true of words."""
     if not factor.is_numeric:
         return True
     steps = np.diff([float(v) for v in factor.levels if isinstance(v, int | float)])
@@ -237,7 +237,10 @@ def is_to_scale(factor: Factor) -> bool:
 
 
 def tick_names(over: Factor) -> tuple[list[str], str]:
-    """Short names of the levels and the unit they have in common; below 1 s in milliseconds."""
+    """Return the short names of the levels and the unit they have in common.
+
+    Below 1 s in milliseconds.
+    """
     values = [v for v in over.levels if isinstance(v, int | float)]
     unit = unit_of(over.name)
     if not over.is_numeric or not unit:
@@ -248,7 +251,7 @@ def tick_names(over: Factor) -> tuple[list[str], str]:
 
 
 def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
-    """A logarithmic axis for what is drawn, with plain numbers at round places and no others."""
+    """Make an axis logarithmic, with plain numbers at round places and no others."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     axis = axes.xaxis if which == "x" else axes.yaxis
@@ -270,14 +273,17 @@ def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
 
 
 def hatch_words(view: StudyView) -> str:
-    """Caption of the hatching; empty if no panel has any."""
+    """Return the caption of the hatching; empty if no panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
     return "Hatched: at least one line is extrapolated there (marked † in the tables)."
 
 
 def panel_grid(view: StudyView, height: float) -> tuple[Figure, list[Axes]]:
-    """Axes for each setting shown, up to three abreast, four as two by two; `height` each [in]."""
+    """Return axes for each setting shown, up to three abreast, four as two by two.
+
+    `height` each [in].
+    """
     count = len(view.shown)
     columns = 2 if count == 4 else count
     rows = count // columns
@@ -287,7 +293,7 @@ def panel_grid(view: StudyView, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def label_panels(axes: Sequence[Axes], view: StudyView, text: str) -> None:
-    """Titles and x for a grid of panels; what is common to them on its outer edges only."""
+    """Label a grid of panels; what is common to them stands on its outer edges only."""
     columns = 2 if len(axes) == 4 else len(axes)
     for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
         panel_title(ax, panel, _TITLE // columns)
@@ -304,7 +310,7 @@ def panel_title(axes: Axes, panel: Setting, width: int = 90) -> None:
 
 
 def panel_name(panel: Setting) -> str:
-    """`250 ms, latest-wins`; nothing if there is but one panel."""
+    """Return `250 ms, latest-wins`; nothing if there is but one panel."""
     return capital(brief(panel))
 
 
@@ -319,28 +325,31 @@ def _make_room(axes: Axes, columns: int) -> None:
 
 
 def has_lines(view: StudyView) -> bool:
-    """Lines lead from number to number, if all steps are equal: else their slope means nothing."""
+    """Return lines lead from number to number, if all steps are equal.
+
+    Else their slope means nothing.
+    """
     return leads_on(view) and view.over is not None and is_to_scale(view.over)
 
 
 def leads_on(view: StudyView) -> bool:
-    """True if the stops are numeric, so that a line may join them."""
+    """Return True if the stops are numeric, so that a line may join them."""
     return view.over is not None and view.over.is_numeric and len(view.stops) > 1
 
 
 def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
-    """Each line's place beside its stop, so that the marks of a stop stand in a row."""
+    """Return each line's place beside its stop, so that the marks of a stop stand in a row."""
     width = 0.8 / len(lines)
     return [(level, (i - (len(lines) - 1) / 2) * width) for i, level in enumerate(lines)]
 
 
 def stop_of(view: StudyView, stop: Level) -> Setting:
-    """The level along x that a stop stands for, by its factor."""
+    """Return the level along x that a stop stands for, by its factor."""
     return {view.over.name: stop} if view.over else {}
 
 
 def place_of(over: Factor, value: float) -> float | None:
-    """Position of a value among evenly spaced levels; None if outside."""
+    """Return the position of a value among evenly spaced levels; None if outside."""
     levels = np.array([float(v) for v in over.levels if isinstance(v, int | float)])
     if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
         return None
@@ -375,7 +384,7 @@ class ReportFigure(ABC):
     has_panels: ClassVar[bool] = False
 
     def applies(self, view: StudyView, reading: Reading) -> bool:
-        """True if the results have the page, tables and columns that the figure needs."""
+        """Return True if the results have the page, tables and columns that the figure needs."""
         if self.pages and reading.page.name not in self.pages:
             return False
         return all(map(reading.table, self.tables)) and all(map(view.part.has, self.columns))
@@ -402,7 +411,7 @@ class ReportFigure(ABC):
         title: str = "",
         reads: Sequence[str] = (),
     ) -> Drawn:
-        """The finished figure, as vectors and pixels, with nothing that changes day by day.
+        """Return the finished figure, as vectors and pixels, with nothing that changes day by day.
 
         Args:
             figure: Figure made by `panels`.

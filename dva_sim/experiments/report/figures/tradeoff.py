@@ -101,7 +101,7 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
 
 
 def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> list[Bars]:
-    """A mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
+    """Return a mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
     paint, mark = looks(view.line)[level]
     x = exposure.mean
     y = response.mean
@@ -113,7 +113,7 @@ def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Ban
 
 
 def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
-    """The ends of a line, or each word; none beside another that it would be written over."""
+    """Name the ends of a line, or each word; none where it would cover another."""
     if view.over is None or len(x) < 2:
         return
     wide = np.ptp(ax.get_xlim())

@@ -91,7 +91,7 @@ def name_and_unit(key: str) -> tuple[str, str]:
 
 
 def _condition_text(key: str, value: float) -> str:
-    """A condition in words: `width 6.8 mm`."""
+    """Return a condition in words: `width 6.8 mm`."""
     name, unit = name_and_unit(key)
     if unit == "m" and value < 1.0:
         value = 1000.0 * value
@@ -121,12 +121,12 @@ def _way(ax: Axes, trace: Trace, unit: LengthUnit, scenario: TaskScenario) -> No
 
 
 def _scaled(places: Sequence[tuple[float, float]], unit: LengthUnit) -> list[list[float]]:
-    """x and y of places [m] in a unit."""
+    """Return x and y of places [m] in a unit."""
     return [[unit.per_m * value for value in values] for values in zip(*places, strict=True)]
 
 
 def _bodies(ax: Axes, trace: Trace, radius: float) -> None:
-    """The vehicle's body, as wide as it is, every few widths of the way [m]."""
+    """Draw the vehicle's body, as wide as it is, every few widths of the way [m]."""
     from matplotlib.patches import Circle
 
     last = None
@@ -137,7 +137,7 @@ def _bodies(ax: Axes, trace: Trace, radius: float) -> None:
 
 
 def _numbers(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
-    """In which order the places are gone to, beside them, away from the others."""
+    """Write in which order the places are gone to, beside them, away from the others."""
     middle = float(np.mean([x for x, _, _ in trace.marks]))
     for number, (x, y, radius) in enumerate(trace.marks, 1):
         side = -1.0 if x < middle else 1.0
@@ -171,7 +171,7 @@ def _speed(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
 
 
 def _mark_timed(ax: Axes, row: Row) -> None:
-    """From when the movement time counts, unless that is the whole trial."""
+    """Mark from when the movement time counts, unless that is the whole trial."""
     begun = row["trial_time_s"] - row["movement_time_s"]
     if begun > 0.0:
         ax.axvspan(0.0, begun, color=FAINT, lw=0, label="not timed")

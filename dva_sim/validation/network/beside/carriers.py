@@ -240,7 +240,7 @@ class StreamCarrier(Carrier):
 
 
 def websocket_header(size: int, masked: bool) -> int:
-    """RFC 6455, section 5.2: from a client with a mask [B]."""
+    """Return the RFC 6455, section 5.2: from a client with a mask [B]."""
     length = 0 if size < 126 else 2 if size < 65_536 else 8
     return 2 + length + 4 * masked
 
@@ -279,7 +279,7 @@ class MqttLeg:
         self._out.send(what, size)
 
     def acknowledged(self) -> None:
-        """One fewer is in flight."""
+        """Note that one fewer is in flight."""
         self._in_flight -= 1
         if self._waiting:
             self.publish(*self._waiting.popleft())
@@ -367,7 +367,7 @@ class MqttCarrier(Carrier):
         self._operator.forward(number, self._size(PICTURES, self.between.picture_bytes))
 
     def _size(self, topic: str, payload: int) -> int:
-        """MQTT 5.0, section 3.3: a PUBLISH without properties [B]."""
+        """Return the MQTT 5.0, section 3.3: a PUBLISH without properties [B]."""
         rest = 2 + len(topic) + 2 * (self._qos > 0) + 1 + payload
         return 1 + (1 if rest < 128 else 2 if rest < 16_384 else 3) + rest
 
@@ -385,7 +385,7 @@ class ZeroMqCarrier(Carrier):
     def _connection(
         self, at_robot: Callable[[Any], object], at_operator: Callable[[Any], object]
     ) -> ZmtpConnection:
-        """A connection that the operator opens."""
+        """Return a connection that the operator opens."""
         links = (self.between.up, self.between.down)
         both = self._options
         return ZmtpConnection(self.clock, *links, at_robot, at_operator, both, both)
@@ -482,7 +482,7 @@ class RequestWire(Wire):
 
 
 def why_not(transport: CommandTransport) -> str:
-    """Reason why the model does not cover a transport; empty if it does."""
+    """Return the reason why the model does not cover a transport; empty if it does."""
     if isinstance(transport, MqttTransport):
         if transport.qos > 1:
             return "MQTT's quality of service 2 is not modelled"
@@ -502,7 +502,7 @@ def why_not(transport: CommandTransport) -> str:
 
 
 def carrier_of(transport: CommandTransport, between: BetweenPrograms) -> Carrier:
-    """The carrier that plays a transport of which `why_not` says nothing."""
+    """Return the carrier that plays a transport of which `why_not` says nothing."""
     if isinstance(transport, ZeroMqTransport):
         kind = RequestCarrier if transport.pattern == "req-rep" else PublishCarrier
         return kind(between, transport)

@@ -39,7 +39,7 @@ NOT_JUDGED: Final = "not judged"
 
 
 def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
-    """The middleware configurations of a study, with the seeds of their runs.
+    """Return the middleware configurations of a study, with the seeds of their runs.
 
     Args:
         results: Those of the study, whose scenarios may have been others.
@@ -79,7 +79,7 @@ class Measured:
 
 
 def measured_in(results: Results) -> dict[str, Measured]:
-    """The runs of a study's results, by configuration.
+    """Return the runs of a study's results, by configuration.
 
     Raises:
         ConfigError: they are not those of a middleware study, or cannot be read.
@@ -99,7 +99,9 @@ def measured_in(results: Results) -> dict[str, Measured]:
 
 
 def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Measured]:
-    """The kept commands of a study, by configuration; it is not kept which runs were disturbed.
+    """Return the kept commands of a study, by configuration.
+
+    It is not kept which runs were disturbed.
 
     Args:
         path: A table of commands, by middleware, link and person: when each was made and when it
@@ -131,7 +133,7 @@ def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Me
 def _measures(
     scenario: MiddlewareScenario, runs: Iterable[Sequence[tuple[float, float]]]
 ) -> dict[str, list[float]]:
-    """The measures of some runs by the newest command at each time, as a run takes them."""
+    """Return the measures of some runs by the newest command at each time, as a run takes them."""
     window = Window(0.0, scenario.set_up_s, scenario.set_up_s + scenario.measure_s)
     rows = []
     for run in runs:
@@ -146,7 +148,7 @@ def _measures(
 def lines_beside(
     predictions: Sequence[CellPrediction], measured: Mapping[str, Measured] | None
 ) -> list[Evidence]:
-    """Every measure of every configuration, with what was measured, if anything was."""
+    """Return every measure of every configuration, with what was measured, if anything was."""
     lines = []
     for measure in ALLOWANCES:
         for prediction in predictions:
@@ -184,7 +186,10 @@ def _line(prediction: CellPrediction, measure: str, own: Measured | None) -> Evi
 
 
 def rule_of(lines: Sequence[Evidence]) -> Evidence:
-    """The share of rows inside their bands; it misses if what was measured cannot be judged."""
+    """Return the share of rows inside their bands.
+
+    It misses if what was measured cannot be judged.
+    """
     verdicts = [line.verdict for line in judged(lines)]
     if verdicts:
         held = verdicts.count("holds")

@@ -76,7 +76,7 @@ class PredictedBand(NamedTuple):
     high: float
 
     def holds(self, value: float) -> bool:
-        """True if a measured value lies inside."""
+        """Return True if a measured value lies inside."""
         return self.low <= value <= self.high
 
 
@@ -127,7 +127,7 @@ class AskedCell:
 def predict_all(
     asked: Sequence[AskedCell], plays: int, workers: int, progress: Progress = lambda done: None
 ) -> list[CellPrediction]:
-    """The predictions of some configurations, in their order.
+    """Return the predictions of some configurations, in their order.
 
     Raises:
         RunsFailed: a play failed.
@@ -150,12 +150,12 @@ def predict_all(
 
 
 def plays_in(asked: Sequence[AskedCell], plays: int) -> int:
-    """Number of runs needed."""
+    """Return the number of runs needed."""
     return sum(plays * len(cell.seeds) for cell in asked if not cell.why_not)
 
 
 def perform(job: StudyJob) -> Tables:
-    """The plays of one seed of one configuration."""
+    """Return the plays of one seed of one configuration."""
     scenario = job.scenario
     plays = int(str(job.levels["plays"]))
     assert isinstance(scenario, MiddlewareScenario)
@@ -189,7 +189,7 @@ def _bands(cell: AskedCell, by_seed: Sequence[Sequence[Row]]) -> dict[str, Predi
 def widened(
     band: PredictedBand, allowance: Allowance, scenario: MiddlewareScenario
 ) -> PredictedBand:
-    """A band with room for what the model leaves out; nothing measured is below 0."""
+    """Return a band with room for what the model leaves out; nothing measured is below 0."""
     low, predicted, high = band
     amount = allowance.amount(scenario)
     return PredictedBand(
@@ -201,7 +201,7 @@ def widened(
 
 # --- the table that is kept ------------------------------------------------------------------
 def rows_of(predictions: Sequence[CellPrediction]) -> list[Row]:
-    """A row for each configuration that is predicted."""
+    """Return a row for each configuration that is predicted."""
     return [
         {
             **prediction.levels,
@@ -219,7 +219,7 @@ def rows_of(predictions: Sequence[CellPrediction]) -> list[Row]:
 
 
 def read_kept(name: str = KEPT) -> dict[tuple[str, tuple[int, ...]], dict[str, PredictedBand]]:
-    """The bands of a table that was kept, by configuration and seeds.
+    """Return the bands of a table that was kept, by configuration and seeds.
 
     Raises:
         ConfigError: it cannot be read, or something is missing in it.

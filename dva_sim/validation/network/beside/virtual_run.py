@@ -42,7 +42,7 @@ class ProgramTimes(NamedTuple):
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> ProgramTimes:
-        """Some, by chance."""
+        """Return some, by chance."""
         return cls(rng.uniform(*STARTS_S), rng.uniform(*STARTS_S), rng.uniform(*ENDS_S))
 
 
@@ -61,7 +61,7 @@ class CountedLink(PartedLink):
         return arrival
 
     def passed_bytes(self, by: float) -> int:
-        """Bytes that have come out by a time [s]."""
+        """Return bytes that have come out by a time [s]."""
         return sum(size for arrival, size in self._passed if arrival <= by)
 
 
@@ -101,7 +101,7 @@ class VirtualRun:
         self._pictures = 0
 
     def play(self) -> Row:
-        """The measures of the run, by the columns of a real one."""
+        """Return the measures of the run, by the columns of a real one."""
         clock = self._clock
         window = self._window
         times = self._times
@@ -126,7 +126,7 @@ class VirtualRun:
         self._notes.append(Note(kind, number, self._clock.now))
 
     def _begin(self) -> None:
-        """The connection stands; if that took too long, the program has given up."""
+        """Begin on a connection that stands; after too long a wait the program has given up."""
         if self._clock.now < self._window.since:
             self._operator.start(self._window.until)
 

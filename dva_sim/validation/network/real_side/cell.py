@@ -100,7 +100,7 @@ class Node:
 
 
 def start_node(name: str, program: Program) -> Node:
-    """A process that runs a program and then ends.
+    """Return a process that runs a program and then ends.
 
     Args:
         name: Name of the process.
@@ -119,7 +119,7 @@ def start_node(name: str, program: Program) -> Node:
 
 
 def _live(parent: int, program: Program, channel: socket.socket, notes: FileNotes) -> None:
-    """All that a node's process does; it never returns."""
+    """Do all that a node's process does; never return."""
     code = 1
     try:
         linux_calls.die_with_parent(parent)
@@ -167,12 +167,12 @@ class EmulatedJob:
     rootless: bool = False
 
     def to_json(self) -> str:
-        """One line."""
+        """Return one line."""
         return json.dumps(vars(self) | {"wire": self.wire.model_dump(mode="json")})
 
     @classmethod
     def from_json(cls, text: str) -> EmulatedJob:
-        """The job of such a line."""
+        """Return the job of such a line."""
         data = json.loads(text)
         return cls(**data | {"wire": LinkConfig.model_validate(data["wire"])})
 
@@ -199,12 +199,12 @@ class EmulatedOutcome:
     problem: str = ""
 
     def to_json(self) -> str:
-        """One line."""
+        """Return one line."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> EmulatedOutcome:
-        """The outcome of a line that the process printed."""
+        """Return the outcome of a line that the process printed."""
         data = json.loads(text)
         for end in ("operator", "robot"):
             data[end] = [Note(*note) for note in data[end]]
@@ -276,7 +276,7 @@ class EmulatedCell:
 
 
 def columns_of(report: LinkReport) -> LinkColumns:
-    """The columns of the emulator, by the letters of both ends: a is the operator."""
+    """Return the columns of the emulator, by the letters of both ends: a is the operator."""
     columns: LinkColumns = {}
     for way, flow in (("ab", report.up), ("ba", report.down)):
         columns[f"emu_pkts_{way}"] = flow.offered_packets
@@ -301,7 +301,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
 
 
 def _programs(job: EmulatedJob) -> tuple[Program, Program]:
-    """Programs of both ends: the operator's and the robot's."""
+    """Return programs of both ends: the operator's and the robot's."""
     arguments = job.arguments
     if job.program == "commands":
         condition = Condition(**arguments)
@@ -369,7 +369,7 @@ def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Po
 
 
 def why_no_packets() -> str:
-    """One line that says why packets cannot be emulated here; empty where they can."""
+    """Return one line that says why packets cannot be emulated here; empty where they can."""
     if sys.platform != "linux":
         return f"the emulated link {NEEDS}; this is {sys.platform}"
     try:

@@ -49,7 +49,7 @@ Machine = dict[str, str | int | bool | None]
 
 
 def describe_machine(link: str) -> Machine:
-    """Versions, clock and processor; no names of machines, people or folders.
+    """Return versions, clock and processor; no names of machines, people or folders.
 
     A run of nothing shows what the machine allows: how the namespaces were made, and whether
     real-time priority was granted.
@@ -76,7 +76,7 @@ def describe_machine(link: str) -> Machine:
 
 
 def _timer_hz() -> int | None:
-    """The kernel's timer frequency [Hz], where its configuration can be read."""
+    """Return the kernel's timer frequency [Hz], where its configuration can be read."""
     text = ""
     with suppress(OSError):
         text = gzip.decompress(Path("/proc/config.gz").read_bytes()).decode()
@@ -130,7 +130,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 
 
 def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
-    """Job for the process of one run."""
+    """Return the job for the process of one run."""
     played_s = condition.warm_s + condition.dur_s
     return EmulatedJob(
         "commands",
@@ -359,7 +359,7 @@ def made_with(path: Path) -> str:
 
 
 def shortened(block: BlockConfig) -> list[Condition]:
-    """Each link once, with programs by turns, measured for a short time."""
+    """Return each link once, with programs by turns, measured for a short time."""
     names = list(block.programs)
     found = []
     for turn, link in enumerate(block.links):

@@ -162,7 +162,7 @@ class OperatorSockets:
 
 
 def _open(context: Context, condition: Condition, operator: bool) -> Socket:
-    """A socket of one end, set as the condition says."""
+    """Return a socket of one end, set as the condition says."""
     kind = _ENDS[condition.pattern][0 if operator else 1]
     conflates = condition.conflate in ("both", "op" if operator else "rob")
     opened = plain_socket(context, kind, condition.hwm, conflates)

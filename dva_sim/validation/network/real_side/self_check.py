@@ -73,7 +73,7 @@ class Probe:
     find: Callable[[Crossing], list[LinkFinding]]
 
     def job(self, rootless: bool) -> EmulatedJob:
-        """Job of the run, long enough for the last packet to arrive."""
+        """Return the job of the run, long enough for the last packet to arrive."""
         wire = self.wire
         linger_s = wire.delay_s + wire.jitter_s + 0.1
         linger_s += max(0.0, self.count * (8 * self.size / wire.rate_bps - self.interval_s))
@@ -139,7 +139,7 @@ def check_link(rootless: bool = False) -> list[LinkFinding]:
 
 
 def find_delay(crossing: Crossing) -> list[LinkFinding]:
-    """The median and the 95th percentile of a constant delay."""
+    """Return the median and the 95th percentile of a constant delay."""
     wanted = 1e3 * crossing.wire.delay_s
     p50, p95 = (1e3 * float(p) for p in np.percentile(crossing.delays, (50, 95)))
     band = 1e3 * _DELAY_BAND_S
@@ -150,7 +150,7 @@ def find_delay(crossing: Crossing) -> list[LinkFinding]:
 
 
 def find_jitter(crossing: Crossing) -> list[LinkFinding]:
-    """Half-width of a uniform law, and whether packets overtake as they may.
+    """Return the half-width of a uniform law, and whether packets overtake as they may.
 
     From the standard deviation, which a single late packet does not move.
     """
@@ -167,7 +167,7 @@ def find_jitter(crossing: Crossing) -> list[LinkFinding]:
 
 
 def find_loss(crossing: Crossing) -> list[LinkFinding]:
-    """The share of independent losses."""
+    """Return the share of independent losses."""
     share = crossing.wire.loss
     lost = crossing.lost
     sigma = np.sqrt(share * (1 - share) / len(lost))
@@ -175,7 +175,7 @@ def find_loss(crossing: Crossing) -> list[LinkFinding]:
 
 
 def find_bursts(crossing: Crossing) -> list[LinkFinding]:
-    """The mean length of runs of losses, whose law is geometric."""
+    """Return the mean length of runs of losses, whose law is geometric."""
     runs = [sum(1 for _ in run) for lost, run in groupby(crossing.lost) if lost]
     bursts = crossing.wire.bursts
     mean = (bursts and bursts.mean_packets) or 1.0
@@ -186,7 +186,7 @@ def find_bursts(crossing: Crossing) -> list[LinkFinding]:
 
 
 def find_rate(crossing: Crossing) -> list[LinkFinding]:
-    """Bits that arrive per second while packets wait."""
+    """Return bits that arrive per second while packets wait."""
     wanted = 1e-3 * crossing.wire.rate_bps
     bits = 8 * crossing.size * (len(crossing.arrived) - 1)
     found = 1e-3 * bits / float(crossing.arrived[-1] - crossing.arrived[0])
