@@ -48,10 +48,10 @@ test-system: $(DEV)  ## programs as users start them, with real processes, socke
 	@echo "Running the tests of whole programs ..."
 	@$(PYTEST) -m "system and not soak and not browser"
 
-test-browser: $(DEV)  ## the console's pages in the system's Chromium
+test-browser: $(DEV)  ## the console's pages, and the search of the docs, in Chromium
 	@$(BIN)/python tests/helpers/console/chromium.py
 	@echo "Running the tests in a browser ..."
-	@$(PYTEST) tests/console/browser
+	@$(PYTEST) tests/console/browser tests/docs/browser
 
 test-extras: $(EXTRAS)  ## what needs extras: every transport over its real middleware, environments for learners, a client of ROS
 	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \

@@ -11,6 +11,7 @@ from sphinx.environment import BuildEnvironment
 sys.path.insert(0, str(Path(__file__).parent))
 
 import generators
+from search_words import WORDS
 
 project = "dva-sim"
 author = "The dva-sim authors"
@@ -39,6 +40,7 @@ html_theme = "furo"
 html_title = f"dva-sim {version}"
 html_copy_source = False
 html_show_sphinx = False
+html_search_scorer = str(Path(__file__).parent / "search_scorer.js")
 
 
 def setup(app: Sphinx) -> None:
@@ -46,6 +48,7 @@ def setup(app: Sphinx) -> None:
     generators.write(Path(app.srcdir))
     app.connect("env-get-outdated", _outdated)
     app.connect("source-read", _lead_to_generated_pages)
+    app.connect("source-read", _add_search_words)
 
 
 def _outdated(
@@ -73,3 +76,9 @@ def _lead_to_generated_pages(_app: Sphinx, _name: str, source: list[str]) -> Non
         return f"](../results/{'index' if link[1] == 'README' else link[1]}.md)"
 
     source[0] = _STUDY.sub(of_study, _INDEX.sub(of_reference, source[0]))
+
+
+def _add_search_words(_app: Sphinx, name: str, source: list[str]) -> None:
+    """Let a page be found by words that it does not use."""
+    if name in WORDS:
+        source[0] = f"---\nmyst:\n  html_meta:\n    keywords: {WORDS[name]}\n---\n\n{source[0]}"

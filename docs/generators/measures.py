@@ -21,7 +21,7 @@ that waits for something counts with the whole horizon if that never comes.
 
 def page() -> str:
     """Return the page in Markdown."""
-    return page_of("Measures and columns", _HEAD, *_covariates(), *_models())
+    return page_of("Measures and columns", _HEAD, *_models(), *_covariates())
 
 
 def _covariates() -> Iterator[str]:

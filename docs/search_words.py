@@ -1,0 +1,25 @@
+"""Words by which people look for a page, and which the page itself does not use."""
+
+WORDS = {
+    "explanation/dissertation": "thesis, document, phone, app",
+    "explanation/several-dvas": "distributed, regions, failover, takeover",
+    "how-to/bad-link": "emulate, delay, loss, netem, programs",
+    "how-to/cluster-and-resume": "killed, resume, continue, slurm, dask, crash",
+    "how-to/control-room": "operator, dispatch, console, roles, audit",
+    "how-to/export": "pandas, csv, parquet, excel, spreadsheet",
+    "how-to/gate-in-ci": "regression, pipeline, pull, request, github",
+    "how-to/own-map-and-trace": "my, compare, two, patterns, floor, plan, import, load, delays",
+    "how-to/own-operator": "my, filter, mapping, tilt, strategy, human",
+    "how-to/own-pattern": "my, messaging, compare, patterns, req, rep, pub, sub",
+    "how-to/own-robot-protocol": "my, attach, connect, add, real, device",
+    "how-to/own-robot-ros": "my, attach, connect, add, real, turtlebot, gazebo, rosbridge",
+    "how-to/own-transport": "my, middleware, compare, mqtt, zenoh, dds",
+    "how-to/phones-and-certificates": "https, tilt, sensor, iphone, android, trust, warning",
+    "how-to/preregister": "register, hypothesis, prediction",
+    "how-to/record-and-replay": "mcap, foxglove, video, film, play",
+    "how-to/several-machines": "distributed, computers, keys, curve, network",
+    "how-to/train-a-policy": "reinforcement, learning, gymnasium, agent",
+    "how-to/users": "login, password, account, roles",
+    "how-to/work-a-shift": "operator, alarm, hand, over, desk",
+    "tutorials/drive": "first, phone, tilt, console, teleoperation",
+}
