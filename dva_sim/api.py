@@ -128,7 +128,7 @@ def run(options: RunOptions) -> Results:
         What came out; `failures` tells of runs that failed.
 
     Raises:
-        DvaSimError: a mistake in what was asked for, a disk that is full, or runs that should be
+        DvaSimError: invalid arguments, a disk that is full, or runs that should be
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
@@ -147,7 +147,7 @@ def dry_run(options: RunOptions) -> DryRun:
     """Preview `run` and its duration; if no run is done yet, a few are tried.
 
     Raises:
-        DvaSimError: a mistake in what was asked for.
+        DvaSimError: invalid arguments.
     """
     from dva_sim.experiments.execution.dry_run import dry_run as preview  # late: start-up
     from dva_sim.experiments.execution.scheduling import run_job  # late: start-up
@@ -160,7 +160,7 @@ def dry_run(options: RunOptions) -> DryRun:
 
 @_with(NewOptions)
 def new(options: NewOptions) -> Path:
-    """Write a study to begin with, which runs as it stands; its file.
+    """Write a template study that runs as it stands; return its file.
 
     Raises:
         DvaSimError: there is such a file, or it cannot be written.
@@ -189,7 +189,7 @@ def register(options: RegisterOptions) -> Preregistration:
 
 @_with(TuneOptions)
 def tune(options: TuneOptions) -> TunedValues:
-    """Choose what a study has tuned, on persons who take no part in it, and keep it beside it.
+    """Tune what a study leaves to be tuned, on persons of their own, and save the choice.
 
     Raises:
         DvaSimError: the study tunes nothing, or runs failed.
@@ -207,7 +207,7 @@ def tune(options: TuneOptions) -> TunedValues:
 
 @_with(ReportOptions)
 def report(options: ReportOptions) -> Path:
-    """Make the report of a results folder again, or of a study under way so far; its page.
+    """Write the report of a results folder again, also of a running study; return its page.
 
     Raises:
         DvaSimError: no results there, no browser that prints, or a disk that cannot

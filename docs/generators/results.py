@@ -41,8 +41,8 @@ Intervals describe the simulated persons. They hold for real people as far as th
 [operators and assumptions](../explanation/operators.md) says how far that is."""
 _HOW_TO_READ = (
     "What each choice costs beyond the best one on its link, from the least to the greatest over "
-    'the models of the persons. "=": as good as the best; "?": not settled; "never": no run was '
-    "finished in the time it had."
+    'the models of the persons. "=": as good as the best; "?": too few drives to tell; "never": no '
+    "run was finished in the time it had."
 )
 
 

@@ -26,7 +26,7 @@ from dva_sim.protocol.exchange import (
 )
 from dva_sim.worlds.geo import GeoFrame
 
-HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
+HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none is a prefix of another
 STATUS = "status|"
 HOLDER = "holder|"
 EMERGENCY = "emergency|"
@@ -126,7 +126,7 @@ class AgentDevice:
         self.label = self.labels[self.id_tag] = distinct(label, self.id_tag, others)
 
     def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
-        """Make oneself known to the DVA until it has answered, then renew that now and then.
+        """Register with the DVA until it has answered, then renew that now and then.
 
         So a restarted DVA learns of every device again.
 
@@ -203,7 +203,7 @@ class AgentDevice:
         self.come_back()
 
     def come_back(self) -> None:
-        """Have a new life, and be registered nowhere as yet."""
+        """Start a new life, registered nowhere yet."""
         self.silent = False
 
     def _register(self, then: Callable[[], object], bond: tuple[int, str]) -> None:
@@ -455,7 +455,7 @@ class AgentDevice:
             message: Content of the request.
             handler: Handler that returns the reply; None: the message waits, and is concluded
                 later.
-            at_once: It is refused as it arrives: who sends such, is listened to less and less.
+            at_once: It is refused as it arrives: a sender of such is listened to less and less.
         """
         note = self._nuisances.bad if at_once else self._nuisances.good
         note(request.peer, self.clock.now)

@@ -14,7 +14,7 @@ MAGIC = b'{"robot":'  # how each header begins
 JPEG_END = b"\xff\xd9"
 MOST_HEADER = 512  # bytes
 MOST_PICTURE = 1 << 20  # bytes
-ALIVE = -1  # robot of a record that says only that somebody draws
+ALIVE = -1  # robot number of a keep-alive record
 
 
 class Picture(NamedTuple):

@@ -17,8 +17,8 @@ from dva_sim.cameras.frames import ALIVE, Picture, pack
 from dva_sim.serving.pipes import PipeEnd
 
 NICENESS = 3  # the run goes first
-ALIVE_S = 1.0  # so often it says that it lives [s]
-IDLE_S = 0.25  # it looks up at least so often [s]
+ALIVE_S = 1.0  # heartbeat period [s]
+IDLE_S = 0.25  # polling period [s]
 RATE_ROOM = 1.25  # of real time: pictures of a robot in a second, of its frames in one of the run
 LEAST_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
 
@@ -96,7 +96,7 @@ class Painter:
 
 
 def run(world: PipeEnd, web: PipeEnd) -> Painter:
-    """Draw until one of both has ended."""
+    """Draw until either process has ended."""
     painter = Painter()
     alive = 0.0
     while world.is_open and web.is_open:

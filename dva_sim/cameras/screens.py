@@ -42,7 +42,7 @@ class FilmedRun(Protocol):
 
     @property
     def field(self) -> Field:
-        """Everything that has a place."""
+        """Return the positions of all bodies."""
 
 
 class Screens:

@@ -1,4 +1,4 @@
-"""Output for terminals and pipes that cannot show every sign: a plain one stands for it."""
+"""Output for terminals and pipes that cannot encode every sign, with plain ones instead."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _verbose: ContextVar[bool] = ContextVar("verbose", default=False)
 
 @contextmanager
 def loudness(quiet: bool = False, verbose: bool = False) -> Iterator[None]:
-    """Print nothing but mistakes inside, or more than usual."""
+    """Set how much is printed inside the block."""
     token = _verbose.set(verbose and not quiet)
     try:
         if not quiet:
@@ -45,7 +45,7 @@ def detail(line: str) -> None:
 
 
 def print_json(data: Any) -> None:
-    """Print as JSON; what is no number is null."""
+    """Print as JSON; NaN becomes null."""
     print(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))
 
 

@@ -103,7 +103,7 @@ class Dispatcher:
             before = self.orders.counters["preempted"]
             given = self._decide(now)
             sends += given
-            # Who was called away leaves a task open; an order to look leaves one to stand by.
+            # A recalled responder leaves its task open; an order to look leaves one to stand by.
             looks = self.orders.rules.containment and any(map(_is_to_look, given))
             if self.orders.counters["preempted"] == before and not looks:
                 break

@@ -37,7 +37,7 @@ LOOKING = (S.ASSIGNED, S.ON_SCENE)
 """States with an active order to look."""
 
 MOST_OPEN = 10_000  # events at the same time; a report of one more is refused
-KEPT_CLOSED = 1000  # who comes late with word of one of the last is still understood
+KEPT_CLOSED = 1000  # a late word on one of the last is still understood
 MOST_SOURCES = 64  # whose reports of one event are told apart
 DEGREE = 111_000.0  # of latitude [m]
 SAME_SPOT = 0.001  # where reports are not merged, what is taken back was reported just here [m]

@@ -44,7 +44,7 @@ MOST_UNACKNOWLEDGED = 1000
 
 @dataclass
 class Sessions:
-    """Permissions, and the word about their end.
+    """Permissions, and notices of their end.
 
     Attributes:
         unacknowledged: Notices that a robot has not acknowledged, by session. Until then it may
@@ -80,7 +80,7 @@ class Sessions:
         return content, [Send(robot.id_tag, notice, session)] if is_news else []
 
     def hold(self, robot: str) -> tuple[int, Send | None]:
-        """The DVA takes a robot for itself: the session, and what to tell the robot if news."""
+        """Take a robot for the DVA; return the session, and any message to the robot."""
         own = self.permissions.own
         grant, is_news = self.permissions.request(robot, own, "missions")
         assert grant is not None

@@ -230,7 +230,7 @@ class Store:
     # --- from the file -----------------------------------------------------------------
 
     def recall(self, dva: Dva, now: float) -> bool:
-        """Tell a new DVA what an earlier one knew; whether there was anything.
+        """Restore what an earlier DVA knew; return whether there was anything.
 
         Devices count as heard just now: each has its time-out to show that it is there. Who was
         silent, with nothing of it open, is forgotten: it would only hold a place until then. What

@@ -1,4 +1,4 @@
-"""Ctrl-C before a command has begun: one line instead of where in its loading the program was.
+"""Ctrl-C before a command has begun: one line instead of a traceback of loading.
 
 It loads next to nothing itself, so that it is there first.
 """

@@ -86,7 +86,7 @@ class LiveJudge:
         self._judge = Judge(terms)
         self._facts = Facts()
         self._waiting: list[tuple[float, int, Line]] = []
-        self._heard: dict[int, float] = {}  # up to when each part that goes on has told [s]
+        self._heard: dict[int, float] = {}  # latest time reported by each running part [s]
         self._count = 0
         self._latest = 0.0
         self._up_to = 0.0

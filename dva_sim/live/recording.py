@@ -1,4 +1,4 @@
-"""A live run as a recording: parts say what happens, one file takes it, the end makes MCAP of it.
+"""A live run as a recording: parts report to one file, which becomes MCAP in the end.
 
 Each part writes lines into a pipe and never waits: what has no room is dropped and counted. A
 thread of the supervisor puts them into `FILE.part`, so that no robot ever waits for a disk, and

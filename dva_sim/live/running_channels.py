@@ -65,7 +65,7 @@ class RunningChannels:
                 yield channels.disc(self.now, number + 1, incident.hazard)
 
     def take(self, line: Line) -> Iterator[ChannelMessage]:
-        """Return the messages in a line; a line that says nothing of interest has none."""
+        """Return the messages in a line; irrelevant lines have none."""
         word, *rest = line
         if word == SENT_LINE:
             yield self._went(*rest)

@@ -1,4 +1,4 @@
-"""Asking and telling behind one promise, whatever carries the bytes.
+"""Requests and publications behind one interface, whatever carries the bytes.
 
 A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
 (publish/subscribe). `dva_sim.network.virtual_network` keeps the promise in virtual time,

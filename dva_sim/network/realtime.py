@@ -1,4 +1,4 @@
-"""Real time: the same kernel, with the wall clock for time and sockets for company.
+"""Real time: the same kernel, driven by the wall clock and real sockets.
 
 Between two events the kernel waits in the ZeroMQ poller, so that a message is handled as
 soon as it arrives. One thread does everything.
@@ -67,7 +67,7 @@ class Poller:
         self.look(source)
 
     def unregister(self, source: Any) -> None:
-        """Wait for it no more; to be called before it is closed."""
+        """Stop waiting for a socket, before it is closed."""
         self._selector.unregister(self._files.pop(source))
         self._sockets.discard(source)
         self._ask.pop(source, None)
@@ -153,7 +153,7 @@ class LiveClock(Clock):
                 handler(gap)
 
     def unwatch(self, source: Any) -> None:
-        """Look at it no more."""
+        """Stop watching it."""
         if self._handlers.pop(source, None) is not None:
             self._poller.unregister(source)
 
@@ -174,7 +174,7 @@ class LiveClock(Clock):
         self._running = False
 
     def run(self, until: float = math.inf) -> None:
-        """Live until a time [s], or until `stop` is called; who is late reads messages, too."""
+        """Live until a time [s], or until `stop` is called; messages are read even when behind."""
         self._running = True
         end = math.inf if math.isinf(until) else round(until * US)
         self._catch_up(end)
@@ -381,7 +381,7 @@ class _Pulse:
         self.due = time.monotonic()
 
     def beat(self, now: float) -> None:
-        """Do it if it is time."""
+        """Run the action if it is due."""
         if now >= self.due:
             missed = (now - self.due) // self._period
             self.due += (missed + 1.0) * self._period

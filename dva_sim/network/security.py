@@ -1,4 +1,4 @@
-"""Sockets with keys, and a clear word at both ends when two do not come together.
+"""Sockets with keys, and a clear message at both ends when they do not match.
 
 Without keys a socket is only watched. With keys a socket that binds is a CURVE server with its
 device's own key, and one that connects knows the key of the device it wants to reach; who asks
@@ -270,7 +270,7 @@ class Security:
         if self._ring is not None:
             socket.setsockopt(zmq.CURVE_SERVER, 1)
             socket.setsockopt(zmq.ZAP_DOMAIN, device.encode())
-            # Else a server whom nobody tells which keys are good takes any.
+            # Otherwise a server without a list of keys accepts any.
             socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)
         self._watch(socket, device, None)
 

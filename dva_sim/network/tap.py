@@ -1,4 +1,4 @@
-"""A look at what a node is asked and what it answers, and at what it hears of others.
+"""Observer of the requests to a node, of its replies, and of publications that it receives.
 
 A tap is given to a transport for one node, virtual or on sockets, and taken away again at any
 time; without one nothing is done and nothing is kept:

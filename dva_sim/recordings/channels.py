@@ -1,6 +1,6 @@
 """The channels of a recording: positions, hazards, drawings for viewers, events and messages.
 
-Robots and people with where they are taken to be; smoke, radiant heat, gas and water as grids over
+Robots and people with their estimated positions; smoke, radiant heat, gas and water as grids over
 the floor; walls, names of rooms and bodies for a viewer; the story, messages and commands.
 """
 

@@ -52,7 +52,7 @@ def pack(site: Site) -> dict[str, bytes]:
 
 
 def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
-    """The site again, whatever has become of its own files since.
+    """The site, even if its own files have changed since.
 
     Args:
         files: From `pack`.

@@ -1,6 +1,6 @@
 """Messages of ROS as values: checked for types, finite numbers and frames; SI and the site's frame.
 
-Messages are read from JSON as rosbridge writes it. `NaN` and numbers that are none come
+Messages are read from JSON as rosbridge writes it. `NaN` and invalid numbers come
 as null or as `NaN`; both are refused where a value is needed.
 
 References:
@@ -21,7 +21,7 @@ from dva_sim.ros.rosbridge import is_finite
 
 JPEG: Final = b"\xff\xd8\xff"
 RAYS: Final = 36  # of a scan as devices get it, the first one ahead
-MOST_RANGES: Final = 20_000  # of a scan that is read
+MOST_RANGES: Final = 20_000  # maximum scan readings
 FASTEST: Final = 50.0  # design: a robot that says it is faster is not believed [m/s, rad/s]
 MOST_ANGLE: Final = 10.0  # of a scan [rad]
 LATEST: Final = 1 << 40  # no time is later [s]

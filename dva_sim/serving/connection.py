@@ -72,7 +72,7 @@ class HttpProtocol(H11Protocol):
         self._place.drop = self.cut
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give the place to others."""
+        """Release the place of the connection."""
         self._is_lost = True
         super().connection_lost(exc)
         self._place.leave()

@@ -31,7 +31,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self.app = extended(self.app, {PLACE: place, WIRE: self})
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give the place to others."""
+        """Release the place of the connection."""
         super().connection_lost(exc)
         self._place.leave()
 

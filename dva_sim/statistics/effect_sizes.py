@@ -107,7 +107,7 @@ class VarianceReduction:
 
     @property
     def is_lower(self) -> bool:
-        """True if the variance is significantly lower; False where nothing can be told."""
+        """True if the variance is significantly lower; False where it is undetermined."""
         return self.ratio.high < 1
 
 

@@ -1,8 +1,8 @@
 """Paired differences between two treatments of the same persons, with intervals.
 
 Means over persons with their interval; whether a difference lies beyond a bound or within a margin;
-whether there is any, by the test that assumes nothing but that labels could be swapped. Of several
-tests of one family the chance of any false alarm is kept.
+whether there is any, by a permutation test, which assumes only that labels could be swapped. Of
+several tests of one family the chance of any false alarm is kept.
 """
 
 from __future__ import annotations

@@ -258,7 +258,7 @@ class AnswerWatch:
         # Late replies are dropped with their request; a picture is no message.
         is_for_somebody = isinstance(passing.payload, bytes) and b"<reply>" not in passing.payload
         if is_for_somebody and not is_message(passing.payload):
-            self._breach(node, "neither answers nor counts what is no message")
+            self._breach(node, "neither answers nor counts an invalid message")
 
     def tap(self, node: str) -> _Tap:
         """Return what sees the requests to a node."""

@@ -104,7 +104,7 @@ class DvaLives:
         self._away = away
 
     def survive(self, until: float) -> None:
-        """Let time pass, through any death in the midst of a write."""
+        """Advance time, through any death in the middle of a write."""
         run = self._run
         assert run is not None
         while True:

@@ -1,6 +1,6 @@
 """Checks of messaging patterns, in drives over links with delay and loss.
 
-The robot and the app here are the smallest that tell: the app numbers its commands and counts what
+Robot and app are the smallest that can show a fault: the app numbers its commands and counts what
 becomes of each, the robot obeys whatever is newer than the last.
 """
 
@@ -37,7 +37,7 @@ TIMEOUT: Final = 9.0  # [s]
 ATTEMPTS: Final = 3
 HELD: Final = 20  # commands that may wait at the app
 SLACK: Final = 1.0  # beyond what the link needs [s]
-NOTICED: Final = 5.0  # after the time-outs of all attempts somebody who asks has found out [s]
+NOTICED: Final = 5.0  # margin after the time-outs of all attempts [s]
 AGAIN: Final = 15.0  # after the robot is back it is driven again [s]
 SLOW: Final = 50e-6  # [s] of one command; above that an episode is no longer fast
 

@@ -1,9 +1,9 @@
 """Inspection of an event: how pictures convince an operator that it is there, or not.
 
 Each look at a picture says a little for or against, with noise. What speaks for it adds up; what
-speaks against it takes that away again, but not below nothing: who has long seen nothing is not
-harder to convince. From a level on, the criterion, the person is sure. It may be wrong: noise
-alone gets there too, the rarer the higher the criterion and the clearer the pictures.
+speaks against it takes that away again, but not below nothing: a long time without a sight makes
+nobody harder to convince. From a level on, the criterion, the person is sure. It may be wrong:
+noise alone gets there too, the rarer the higher the criterion and the clearer the pictures.
 
 References:
     R. Ratcliff, G. McKoon: The diffusion decision model: theory and data for two-choice decision

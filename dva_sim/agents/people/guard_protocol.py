@@ -1,8 +1,8 @@
 """Protocol of a guard with the DVA. Pure: takes messages and returns what to do now.
 
 The newest order holds. It takes the place of an older one at once, also of work at an event: so
-the guard and the DVA never disagree on what the guard does. Whom the DVA should not call away is
-for the DVA to know.
+the guard and the DVA never disagree on what the guard does. The DVA itself knows whom it should
+not recall.
 """
 
 from __future__ import annotations

@@ -8,11 +8,10 @@ up to where one would touch somebody, if everybody else kept on, or a wall. Two 
 
 Contacts are left to the physics.
 
-Who comes to a door towards which somebody else comes from the other side, and is nearer to it,
-waits beside the way until the other is through; but only as long as its patience lasts. Robots are
-slow and cannot go back: one that comes through a door is waited for longer, and one that stands in
-it may only stand because it is let no farther: it is given time, too. The rules of doors are
-assumed.
+A person waits beside the way to a door for somebody nearer to it who comes from the other side, as
+long as patience lasts. Robots are slow and cannot go back: one that comes through a door is waited
+for longer, and one that stands in it may only stand because its way is blocked: it is given time,
+too. The rules of doors are assumed.
 
 References:
     M. Moussaid, D. Helbing, G. Theraulaz: How simple rules determine pedestrian behavior and

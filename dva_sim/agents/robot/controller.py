@@ -199,7 +199,7 @@ class RobotController:
         )
 
     def expire(self, now: float) -> bool:
-        """End a drive, by messages or by hand, of whom nothing was heard for long; True if so."""
+        """End a drive, by messages or by hand, whose driver has long been silent; True if so."""
         driven = self.mode is TELEOPERATION or self.by_hand is not None
         if driven and now - self.last_valid > LEASE_S:
             self._idle("")

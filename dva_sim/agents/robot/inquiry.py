@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 from dva_sim.protocol import messages as m
 
 BURST = 4.0  # questions that may follow each other at once
-RATE = 4.0  # and then so many, whatever is claimed [1/s]
+RATE = 4.0  # sustained rate limit [1/s]
 MOST_READERS = 64  # devices that wait to be asked about
 MOST_OVER = 1000  # sessions said to be over while one question is under way
-LEAST = 1e-5  # of a question: a clock that counts microseconds may come that much too early
+LEAST = 1e-5  # tolerance of a query for clocks that round to microseconds [s]
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Inquiry:
         """Forget every question, and open the one who holds the robot, as that is forgotten, too.
 
         Args:
-            now: From then on nobody is let at the robot for a while, as after a question [s].
+            now: Start of the period in which nobody may take the robot, as after a query [s].
         """
         fresh = Inquiry(asked_at=now, _holder=True)
         for name in vars(self):

@@ -1,8 +1,8 @@
 """Seats and their clients: pure, without a clock and without sockets.
 
 A client that takes control gets a seat, and keeps it until it gives it up or is gone. What it
-wants must come again and again while it holds on: who falls silent is stopped. A seat is manned
-while its client is there; free seats are manned by open pages that have none.
+wants must come again and again while it holds on: a silent person's robot is stopped. A seat is
+manned while its client is there; free seats are manned by open pages that have none.
 """
 
 from __future__ import annotations

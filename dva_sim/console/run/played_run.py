@@ -39,7 +39,7 @@ class PlayedRun(Protocol):
 
     @property
     def field(self) -> Field:
-        """Everything that has a place."""
+        """All bodies and their positions."""
 
     @property
     def links(self) -> Mapping[str, tuple[Link, Link]]:

@@ -1,6 +1,6 @@
 """The newest state of a run, as its lines tell it; older state is not kept, but for the story.
 
-Each change has a version. Who knows the version of what a page got last knows what is new to it,
+Each change has a version. The version that a page got last tells what is new to it,
 however long it slept: nothing is queued for anybody.
 """
 

@@ -1,6 +1,6 @@
 """Actions of people with phones: registration, a robot, calibration, and tilt samples.
 
-A phone is there from the first word of its page until that is gone for good. One phone holds one
+A phone exists from the first message of its page until that has gone for good. One phone holds one
 robot. What ends a drive ends it at once, and for good.
 """
 
@@ -216,7 +216,7 @@ class PhoneActions:
         """Resolve the requested id; unknown ones pass, so that the DVA can refuse them.
 
         Raises:
-            Refused: it is no device that anybody knows.
+            Refused: the device is unknown.
         """
         return given if given in self._world.run.stage.labels else self._driving.robot(given)
 

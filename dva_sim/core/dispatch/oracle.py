@@ -1,4 +1,4 @@
-"""The best that could have been done, had one known the future: a reference for small cases."""
+"""Clairvoyant optimum, planned with knowledge of the future: a reference for small cases."""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ def _word(f: Finding, difference: float) -> str:
 
 
 def _side(f: Finding, level: str | float | bool | None) -> str:
-    """Return the name of a level; with its factor's where it is no word of its own."""
+    """Return the name of a level; with its factor's where it would be ambiguous."""
     return level_name(f.factor, level) if isinstance(level, str) else named(f.factor, level)
 
 

@@ -123,7 +123,7 @@ def _range(values: Floats) -> str:
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
     """Return `3 to 69`, over the models of persons.
 
-    `=`: as good as any; `0.0 to 9 ?`: not settled.
+    `=`: as good as any; `0.0 to 9 ?`: too few drives to tell.
     """
     if found.never[situation, choice].all():
         return NEVER

@@ -1,4 +1,4 @@
-"""Designs: which levels meet each other, if not every one every other.
+"""Designs: which levels are combined, if not all with all.
 
 Levels are listed, in the study or in a CSV file, or drawn as points of continuous factors: Latin
 hypercubes, Sobol' sequences, and samples for Sobol' indices. The same seed gives the same points.

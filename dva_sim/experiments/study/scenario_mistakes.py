@@ -1,4 +1,4 @@
-"""Mistakes in a scenario that is played, told where they were made.
+"""Places of mistakes in a scenario that is played.
 
 Looking for the place takes all kinds of files, which a scenario without a mistake never needs.
 """

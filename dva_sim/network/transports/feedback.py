@@ -57,7 +57,7 @@ class RoundTrips:
 
 
 class Feedback:
-    """Datagrams that were sent and are not known to have arrived.
+    """Unacknowledged datagrams.
 
     Attributes:
         round_trips: Statistics of round trips.

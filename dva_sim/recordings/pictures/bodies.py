@@ -29,7 +29,7 @@ CONE = 2.5  # length of the view cone [m]
 
 
 class DrawnBody:
-    """One of them with a trail; for a driven robot also what its operator sees.
+    """A body drawn with its trail; for a driven robot also what its operator sees.
 
     Args:
         ax: Axes to draw on.

@@ -1,4 +1,4 @@
-"""Everything that has a place: robots and people of a site, physics around them, hazards."""
+"""Bodies of a run: robots and people of a site, physics around them, hazards."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
 
 
 class Field(RunHazards):
-    """Everything that has a place.
+    """Bodies of a run.
 
     Raises:
         ConfigError: the site cannot hold the team or the events.

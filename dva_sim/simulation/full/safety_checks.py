@@ -1,4 +1,4 @@
-"""An audit of the safety rules from outside: what it can see itself, it believes nobody.
+"""An audit of the safety rules from outside: what it can see itself, it takes from no message.
 
 It takes the facts of a run (`observations`): so it knows which permissions the DVA really gave,
 when a robot learnt that one is over, and when an emergency reached it; how bodies move, and what

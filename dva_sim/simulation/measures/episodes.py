@@ -79,10 +79,10 @@ _OF_DRIVES = (
 _OF_PEOPLE = (
     Measure("dose_heat_max", "largest fractional effective dose of heat; 1 incapacitates"),
     Measure("dose_toxic_max", "largest fractional effective dose of toxic gas; 1 incapacitates"),
-    Measure("incapacitated", "people who could not help themselves any more"),
+    Measure("incapacitated", "people incapacitated"),
 )
 _OF_BYSTANDERS = (
-    Measure("evacuated_share", "share of the bystanders who got out", better="large"),
+    Measure("evacuated_share", "share of bystanders evacuated", better="large"),
     Measure(
         "evacuated_s",
         "when the last of those who got out was out",
@@ -134,7 +134,7 @@ RUN_COLUMNS = (
     Measure("traffic_bytes", "size of all messages on the network"),
     Measure("refused", "requests that were refused"),
     text("network_depth", "how closely the network was modelled: message, segment or datagram"),
-    Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
+    Measure("plugin_failures", "invalid answers of a user's class"),
     Measure(
         "violations",
         "broken safety rules found, of S1 to S7; see docs/explanation/safety-rules.md",
@@ -166,7 +166,7 @@ EVENT_COLUMNS = (
     Measure("confirmation_s", "detection until it is confirmed", title="confirmation time"),
     Measure("containment_s", "detection until it is contained"),
     Measure("closing_s", "detection until it is closed"),
-    Measure("watched_s", "detection until nobody looks any more: the end of the run"),
+    Measure("watched_s", "detection to the end of observation, which is that of the run"),
     Measure("missed", "whether it was refuted although it was there"),
     Measure("false_confirmation", "whether it was confirmed although nothing was there"),
     *decisions.EVENT_COLUMNS,

@@ -88,7 +88,7 @@ RUN_COLUMNS = (
     ),
     *(column for way in WAYS for column in _of_way(way)),
     *DRIVEN_COLUMNS,
-    Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
+    Measure("plugin_failures", "invalid answers of a user's class"),
     Measure("simulated_s", "virtual time simulated"),
 )
 """Columns of a run, which a study may ask for."""

@@ -53,9 +53,7 @@ _FARTHEST = (
     Measure("tilt_max_rad", "farthest that the hand tilted the device about an axis"),
     Measure("deflection_max", "farthest that the stick was deflected, 1 for all the way"),
 )
-_FAILURES = Measure(
-    "plugin_failures", "times that a class of the user's gave no answer that is one"
-)
+_FAILURES = Measure("plugin_failures", "invalid answers of a user's class")
 TRIAL_COLUMNS = (
     *_AVERAGED,
     *_FARTHEST,

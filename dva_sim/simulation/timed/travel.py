@@ -154,7 +154,7 @@ class Terrain:
         return self._middle(zone)
 
     def anywhere(self, rng: np.random.Generator) -> Place:
-        """A place by chance."""
+        """Return a random place."""
         return self._middle(0)
 
     def default_base(self, kind: str) -> str | None:
@@ -479,7 +479,7 @@ class Rooms(Terrain):
     # --- detectors ---------------------------------------------------------------------
 
     def check_detectors(self, kind: str) -> None:
-        """See to it that somebody can notice a kind of event.
+        """Check that a detector can notice this kind of event.
 
         Raises:
             ConfigError: there is no detector for it.

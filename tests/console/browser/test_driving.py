@@ -288,7 +288,7 @@ def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(p
 def test_two_robots_get_the_same_hand_under_two_patterns(console, shared):
     page = shared(console().drive, "drive")
     listen(page)
-    page.get_by_role("button", name="robot-2 beside it").click()
+    page.get_by_role("button", name="Add robot-2").click()
     page.get_by_label("Pattern of robot-1").select_option("req-rep")
     page.get_by_label("Pattern of robot-2").select_option("latest-wins")
     begin(page)

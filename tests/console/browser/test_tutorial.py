@@ -14,11 +14,11 @@ def test_everything_that_the_tutorial_names_in_bold_is_on_the_page(console, shar
     page = shared(console().drive, "drive")
     named = set(re.findall(r"\*\*([^*]+)\*\*", LESSON)) - {"REQ/REP"}
     assert len(named) > 10
-    page.get_by_role("button", name="robot-2 beside it").click()
+    page.get_by_role("button", name="Add robot-2").click()
     expect(page.get_by_text(re.compile("^Latency"))).to_be_visible()
     take(page)
     start(page)  # charts unfold with the first figures of a drive
-    pressed = {"robot-2 beside it"}  # which is there no more
+    pressed = {"Add robot-2"}  # which is there no more
     for name in sorted(named - pressed):
         expect(page.locator("body")).to_contain_text(name, use_inner_text=True)
     release(page)

@@ -1,4 +1,4 @@
-"""Steering by a prediction: what was asked for but not yet seen is added to what is seen.
+"""Predictive steering: the latest picture, plus the commands that it does not show yet.
 
 The oracle steers so from the true state, by a perfect prediction: a reference, not a person.
 
@@ -30,7 +30,7 @@ from dva_sim.kernel import options
 class Predictor(Strategy):
     """Extrapolates the picture by its own commands of the last delay, and steers by that.
 
-    Its model is kinematics alone: what is asked for happens, at once. The delay is what the person
+    Its model is kinematics alone: commands take effect immediately. The delay is what the person
     takes it to be. Of each command the model makes the share `quality`; the share that is left of
     the delay is what the inner strategy has still to be careful about.
 
@@ -173,7 +173,9 @@ class Oracle:
         self._inner = Predictor(person, reach)
 
     def __init_subclass__(cls) -> None:
-        raise TypeError(f"{cls.__name__} cannot derive from Oracle, which alone is told the truth")
+        raise TypeError(
+            f"{cls.__name__} cannot derive from Oracle, which alone has access to the true state"
+        )
 
     def drive(self, route: Route, truth: Truth[Observation], stop_before: float) -> Intent:
         """Return the command for a robot."""

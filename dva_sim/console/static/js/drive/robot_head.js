@@ -46,7 +46,7 @@ function BesideButton({ robot }) {
   if (!other) return null;
   return html`<button type="button" class="beside" disabled=${isHeld()}
     title="Drive two robots with the same input, each with its own messaging pattern"
-    onClick=${() => chooseRobots([robot.label, other.label])}>+ ${other.label} beside it</button>`;
+    onClick=${() => chooseRobots([robot.label, other.label])}>Add ${other.label}</button>`;
 }
 
 /**

@@ -33,7 +33,7 @@ const KNOBS = [
 ]; // prettier-ignore
 
 /** @param {{heading?: string}} props */
-export function LinkPanel({ heading = 'The link you choose' }) {
+export function LinkPanel({ heading = 'Link' }) {
   if (!isModelled.value) return html`<${RealLink} />`;
   return html`<section class="panel link-panel" aria-label="Link settings">
     <h2>${heading}</h2>
