@@ -6,7 +6,7 @@ from dva_sim.kernel import early_stop
 
 
 def main() -> NoReturn:
-    """Entry point: `dva-sim`."""
+    """Run `dva-sim`."""
     early_stop.end_at_once()
     from dva_sim.kernel.rare_collection import collect_rarely  # late: start-up, for Ctrl-C
 

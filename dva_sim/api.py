@@ -48,7 +48,7 @@ else:
     }
 
     def __getattr__(name: str) -> Any:
-        """The classes of what functions return."""
+        """Return the classes of what functions return."""
         if name not in _CLASSES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module(_CLASSES[name]), name)
@@ -102,7 +102,7 @@ def episode(options: EpisodeOptions) -> Episode:
 
 @_with(ReplayOptions)
 def replay(options: ReplayOptions) -> Episode:
-    """A recorded run from its file alone, drawn or taken to ROS 2 if asked to.
+    """Play a recorded run from its file alone; draw it or take it to ROS 2 if asked to.
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
@@ -268,7 +268,7 @@ def load(folder: str | Path) -> Results:
 
 @_with(CompareOptions)
 def compare(options: CompareOptions) -> Comparison:
-    """Two results, or their folders, side by side: what the second has otherwise.
+    """Return two results, or their folders, side by side: what the second has otherwise.
 
     `frame(measure, by)` tells it as columns, and `judge(fail_if)` what a gate makes of it.
 

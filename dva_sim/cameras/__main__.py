@@ -49,7 +49,7 @@ class CameraPages:
         self._numbers = {label: number for number, label in enumerate(labels)}
 
     async def stream(self, request: Request) -> Response:
-        """Answer `GET /camera/LABEL.mjpg`."""
+        """`GET /camera/LABEL.mjpg`."""
         robot = self._robot(request)
         if request.method == "HEAD":
             return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
@@ -59,7 +59,7 @@ class CameraPages:
         return PictureStream(self._streams.stream(viewer), partial(self._streams.leave, viewer))
 
     async def still(self, request: Request) -> Response:
-        """Answer `GET /camera/LABEL.jpg`."""
+        """`GET /camera/LABEL.jpg`."""
         robot = self._robot(request)
         viewer = self._streams.admit(robot, CLIENT)
         picture = None if viewer is None else await self._streams.one(viewer)

@@ -150,11 +150,11 @@ def _judge(name: str) -> FileVerdict:
 
 
 def _near(file: str) -> str:
-    """A path as one would write it here."""
+    """Return a path as one would write it here."""
     here = Path.cwd()
     return str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
 
 
 def _say(text: str) -> None:
-    """One line stays one line, whatever a file or its name holds."""
+    """Say it in one line, whatever a file or its name holds."""
     print(visible(text))

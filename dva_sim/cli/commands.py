@@ -25,7 +25,7 @@ _EXAMPLES = "\nExamples:\n"
 
 
 def name_of(param: Any) -> str:
-    """An option by its long name, an argument by the word in the usage."""
+    """Return an option by its long name, an argument by the word in the usage."""
     if param.param_type_name == "argument":
         return str(param.metavar or param.name.upper())
     return str(max(param.opts, key=len))
@@ -48,13 +48,13 @@ class CommandWithExamples(TyperCommand):
         ]
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Options, then what has to be given, and in brackets what may be."""
+        """Write options, then what has to be given, and in brackets what may be."""
         given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
         names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in given]
         return ["[OPTIONS]", *names]
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Arguments by the words of the usage, then options."""
+        """Write arguments by the words of the usage, then options."""
         given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
         if given:
             with formatter.section("Arguments"):
@@ -64,7 +64,7 @@ class CommandWithExamples(TyperCommand):
             formatter.write_dl([record for record in records if record is not None])
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """The examples as they are, since rewrapped ones cannot be copied."""
+        """Write the examples as they are, since rewrapped ones cannot be copied."""
         super().format_epilog(ctx, formatter)
         if not self.examples:
             return
@@ -85,11 +85,11 @@ class PanelGroup(TyperGroup):
     panels: ClassVar[Panels] = {}
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Their names, panel by panel."""
+        """Return the their names, panel by panel."""
         return [name for commands in self.panels.values() for name in commands]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """One of them; None if there is none of that name."""
+        """Return one of them; None if there is none of that name."""
         for commands in self.panels.values() if cmd_name not in self.commands else ():
             if cmd_name in commands:
                 self.add_command(_made(cmd_name, commands[cmd_name]), cmd_name)
@@ -106,7 +106,7 @@ class PanelGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """One list for each panel."""
+        """Write one list for each panel."""
         widest = max(map(len, self.list_commands(ctx)))
         for title, commands in self.panels.items():
             with formatter.section(title):
@@ -132,7 +132,7 @@ def _made(name: str, command: Command) -> Any:
 def typer_of(
     cls: type[PanelGroup] | None, help: str = "", add_completion: bool = False
 ) -> typer.Typer:
-    """A Typer with our layout, of a group or of one command."""
+    """Return a Typer with our layout, of a group or of one command."""
     return typer.Typer(
         cls=cls,
         help=help,

@@ -13,7 +13,7 @@ say = partial(console.print, soft_wrap=True)  # one line stays one line, also in
 
 
 def print_lines(lines: Iterable[str], where: Console = console) -> None:
-    """Each in a line, however long it is."""
+    """Print each in a line, however long it is."""
     for line in lines:
         where.print(line, soft_wrap=True)
 

@@ -26,7 +26,7 @@ _UNIT = "Unit of acceleration, if the log's header does not give it."
 
 
 def _listed(incomplete: str) -> list[str]:
-    """Completes a kind of things that can be listed."""
+    """Return names that complete a kind of things that can be listed."""
     from dva_sim.cli import names  # late: start-up
 
     return [kind for kind in names.kinds() if kind.startswith(incomplete)]

@@ -90,7 +90,7 @@ def _disturbed(report: LinkReport) -> str:
 
 
 def files_of(out: Path | None, overwrite: bool) -> Mapping[Path, _Text]:
-    """The files that hold the counts, each with what makes its text.
+    """Return the files that hold the counts, each with what makes its text.
 
     Raises:
         ConfigError: they cannot be called so, or are there already.
@@ -125,7 +125,7 @@ def keep(path: Path, text: str) -> None:
 
 
 def _table(report: LinkReport, seed: int) -> str:
-    """A row for each direction; the lateness of the emulator is that of both."""
+    """Return a row for each direction; the lateness of the emulator is that of both."""
     whole = {"disturbed": report.is_disturbed, "seed": seed}
     rows = []
     for name, way in _WAYS.items():

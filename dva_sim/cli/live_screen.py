@@ -81,7 +81,7 @@ class Board:
         return sorted(report.story)
 
     def table(self) -> Table:
-        """The devices: what they are, do, and how the link to each is.
+        """Return the devices: what they are, do, and how the link to each is.
 
         Two lines for each, so that the columns fit 80 characters; a label or an address that is
         longer goes on below.
@@ -99,7 +99,7 @@ class Board:
 
 
 def story_line(line: list[Any]) -> str:
-    """A line of the timeline."""
+    """Return a line of the timeline."""
     time, who, what, _ = line
     return f"{time:7.1f} s  {who:<14} {what}"
 

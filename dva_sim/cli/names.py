@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
-    """Kinds of plug-ins by what several are called, each with the word for trying one."""
+    """Return kinds of plug-ins by what several are called, each with the word for trying one."""
     return {trial.classes: (word, trial.load_plugins()) for word, trial in TRIALS.items()}
 
 
@@ -90,7 +90,7 @@ def _package(entry: Any) -> str:
 
 
 def _near_path(path: Path) -> str:
-    """A path as one would write it here."""
+    """Return a path as one would write it here."""
     here = Path.cwd()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
 
@@ -132,7 +132,7 @@ def kinds() -> list[str]:
 
 
 def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
-    """All that can be named, by kind.
+    """Return all that can be named, by kind.
 
     Args:
         kind: Only this one, such as `studies`.
@@ -191,7 +191,7 @@ def _installed() -> Any:
 
 
 def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
-    """Shipped and installed classes; an installed one is loaded only when it is used."""
+    """Yield the shipped and installed classes; an installed one is loaded only when it is used."""
     values = {entry.name: f"of {entry.value}" for entry in _installed().select(group=trial.group)}
     for name, words in trial.words().items():
         values[name] = _first(words) or values.get(name, "")
@@ -205,7 +205,7 @@ _ABBREVIATED: Final = re.compile(
 
 
 def _first(text: str) -> str:
-    """The first sentence, which no initial and no abbreviation ends."""
+    """Return the first sentence, which no initial and no abbreviation ends."""
     for end in re.finditer(r"[.?!](?=\s+[A-Z])", text):
         if not _ABBREVIATED.search(text[: end.end()]):
             return text[: end.end()]

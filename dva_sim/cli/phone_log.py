@@ -42,7 +42,7 @@ def _guessed(guess: str) -> str:
 
 
 def lines(found: MotionFigures) -> list[str]:
-    """The figures in words."""
+    """Return the figures in words."""
     texts = [
         f"{found.samples} samples in {found.duration_s:.1f} s: {found.rate_hz:.1f} a second, "
         f"jitter {100.0 * found.jitter:.1f} %",
@@ -93,6 +93,6 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
 
 
 def _yaml(value: object) -> str:
-    """A value as YAML has it: that of JSON is."""
+    """Return a value as YAML has it: that of JSON is."""
     assert not (isinstance(value, float) and not math.isfinite(value))
     return json.dumps(value)

@@ -21,7 +21,7 @@ Data = dict[str, Any]
 
 
 def shown(results: Results) -> Data:
-    """The answer, what it rests on, and every cell."""
+    """Return the answer, what it rests on, and every cell."""
     status = status_of(results.manifest)
     reading = Reading(results)
     study = results.study
@@ -48,7 +48,7 @@ def shown(results: Results) -> Data:
 
 
 def table(results: Results, name: str, most: int) -> Data:
-    """The first rows of a table, and what its columns mean.
+    """Return the first rows of a table, and what its columns mean.
 
     Raises:
         ConfigError: no such table.

@@ -74,14 +74,14 @@ COLUMNS = {
 
 
 def tell_any(run: Played, console: Console) -> None:
-    """A run of whatever model: the measures of its row."""
+    """Tell of a run of whatever model: the measures of its row."""
     console.rule(f"{Path(run.scenario.model).name}, seed {run.seed}")
     print_lines(lines_of(run.tables["runs"][0], _columns(run)), console)
     console.print(f"simulated in {run.took_s:.2f} s", soft_wrap=True)
 
 
 def _table(heads: Sequence[str], right: Sequence[str], no_wrap: bool = False) -> Table:
-    """An empty table without lines; heads may have units in brackets."""
+    """Return an empty table without lines; heads may have units in brackets."""
     table = Table(box=None, pad_edge=False)
     for head in heads:
         side: JustifyMethod = "right" if head in right else "left"
@@ -142,7 +142,7 @@ def _failed(row: Row) -> list[str]:
 
 
 def tell_full(run: Played, console: Console) -> None:
-    """A run of the full model: its story, and what came of it."""
+    """Tell the story of a run of the full model, and what came of it."""
     assert isinstance(run.kept, Recording)
     tell_story(run.kept, console)
     tell_outcome(run.tables, f"simulated in {run.took_s:.2f} s", console)
@@ -195,7 +195,7 @@ def _unjudged(found: Sequence[Verdict]) -> str:
 
 
 def _violations(count: int) -> str:
-    """A count of broken rules in words."""
+    """Return a count of broken rules in words."""
     times = "once" if count == 1 else f"{count} times"
     page = "docs/explanation/safety-rules.md"
     return "none was broken" if not count else f"broken {times}; see {page}"
@@ -203,7 +203,7 @@ def _violations(count: int) -> str:
 
 # --- a shift -------------------------------------------------------------------------
 def tell_shift(run: Played, console: Console) -> None:
-    """A shift: its first events, and what it took to deal with all."""
+    """Tell of a shift: its first events, and what it took to deal with all."""
     scenario = run.scenario
     recording = run.kept
     assert isinstance(scenario, TimedScenario)
@@ -276,7 +276,7 @@ def _seconds(value: float) -> str:
 
 # --- a session on a congested link ---------------------------------------------------
 def tell_session(run: Played, console: Console) -> None:
-    """A session on a congested link: each flow, and what the drive came to."""
+    """Tell of a session on a congested link: each flow, and what the drive came to."""
     scenario = run.scenario
     row = run.tables["runs"][0]
     assert isinstance(scenario, TransportScenario)
@@ -329,7 +329,7 @@ def _ms(seconds: float) -> str:
 
 # --- a task --------------------------------------------------------------------------
 def tell_task(run: Played, console: Console) -> None:
-    """A block of trials: the first ones, and all in a few words."""
+    """Tell of a block of trials: the first ones, and all in a few words."""
     scenario = run.scenario
     trials = run.tables["trials"]
     row = run.tables["runs"][0]
@@ -360,7 +360,7 @@ def _first_trials(trials: Sequence[Row]) -> Table:
 
 
 def _head(key: str) -> str:
-    """A column of a condition as a head, with its unit."""
+    """Return a column of a condition as a head, with its unit."""
     from dva_sim.experiments.report.figures.trial import name_and_unit  # late: start-up
 
     name, unit = name_and_unit(key)

@@ -149,6 +149,6 @@ def next_steps(path: Path) -> str:
 
 
 def _with_file(step: str, path: Path) -> list[str]:
-    """The words of a command, the file behind the first."""
+    """Return the words of a command, the file behind the first."""
     verb, *options = step.split()
     return [verb, shlex.quote(str(path)), *options]

@@ -231,7 +231,7 @@ def _stopped(how: KeyboardInterrupt) -> ExitCode:
 # --- progress --------------------------------------------------------------------------
 @contextmanager
 def _bar(what: str, total: int, things: str = "runs") -> Iterator[Progress]:
-    """A bar on a terminal; elsewhere a line now and then."""
+    """Yield a bar on a terminal; elsewhere a line now and then."""
     pace = RunPace(time.monotonic, things)
     if not console.is_terminal:
         yield _Lines(console, pace).show
@@ -292,7 +292,7 @@ class RunPace:
 
 
 def duration(seconds: float) -> str:
-    """In the units that people would say it in."""
+    """Return a duration in the units that people would say it in."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     if seconds < 90 * _MINUTE_S:

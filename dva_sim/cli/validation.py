@@ -138,7 +138,7 @@ def _tell(sheet: ResultSheet) -> None:
 
 
 def _table(heads: Sequence[str], with_heads: bool) -> Table:
-    """A table of even columns, so that those below each other agree."""
+    """Return a table of even columns, so that those below each other agree."""
     table = Table(box=None, pad_edge=False, expand=True, show_header=with_heads)
     for head in heads:
         table.add_column(escape(head), ratio=_WIDTHS.get(head, 3), overflow="fold")
@@ -146,7 +146,7 @@ def _table(heads: Sequence[str], with_heads: bool) -> Table:
 
 
 def _bar() -> bars.Progress:
-    """Says what is under way, how much of it is done, and for how long."""
+    """Return a bar that says what is under way, how much of it is done, and for how long."""
     words = bars.TextColumn("{task.description}")
     done = bars.MofNCompleteColumn()
     return bars.Progress(words, bars.BarColumn(), done, bars.TimeElapsedColumn(), console=console)
@@ -254,7 +254,7 @@ def _compared(
 
 
 def _beside(source: str, quick: bool, workers: int) -> ValidationResult:
-    """Predictions of a middleware study, with its results beside them if there are any."""
+    """Return predictions of a middleware study, with its results beside them if there are any."""
     results = Results.load(source) if Path(source).is_dir() else None
     has_commands = source.endswith(_COMMANDS)
     study = (
@@ -295,7 +295,7 @@ def _measured_now(
 
 
 def _teller(bar: bars.Progress) -> measuring.Tell:
-    """Moves a bar of its own for each block."""
+    """Return moves a bar of its own for each block."""
     tasks: dict[str, bars.TaskID] = {}
 
     def tell(block: str, progress: Progress) -> None:

@@ -67,13 +67,13 @@ WRITTEN = ("*.html", "*.pdf", "*.json", "figures/*", "tables/*")
 
 
 def tell_measures(row: Mapping[str, Any], columns: Iterable[Measure]) -> None:
-    """Every measure of a run, with its unit and what it means."""
+    """Tell every measure of a run, with its unit and what it means."""
     if is_verbose():
         print("", *lines_of(row, columns), sep="\n")
 
 
 def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str]:
-    """Each value of a row in a line, with its unit and what it means."""
+    """Yield each value of a row in a line, with its unit and what it means."""
     from dva_sim.experiments.results.results import plain  # late: start-up
     from dva_sim.kernel.measure import Measure  # late: start-up
 
@@ -86,7 +86,7 @@ def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str
 
 
 def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
-    """The study's file, and every configuration."""
+    """Tell the study's file, and every configuration."""
     if not is_verbose():
         return
     from dva_sim.experiments.study.addresses import REFERENCE  # late: start-up
@@ -99,7 +99,7 @@ def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
 
 
 def tell_files(folder: Path, *patterns: str) -> None:
-    """Files that were written, with their size."""
+    """Tell files that were written, with their size."""
     if not is_verbose():
         return
     for path in sorted(path for pattern in patterns for path in folder.glob(pattern)):

@@ -213,6 +213,6 @@ class ConsoleSupervisor:
         return parse_qs(look.query).get("token", [""])[0]
 
     def _leave(self, world: ConsoleWorld) -> None:
-        """Everybody who drives is stopped, and a moment is left for the word of it."""
+        """Stop everybody who drives, and leave a moment for the word of it."""
         leave_seats(world.seating, world.clock)
         world.tell({"k": "bye", "t": world.feed.now_ms, "why": "the console was ended"})

@@ -24,11 +24,11 @@ class Assignments:
     _events: dict[str, dict[int, Event]] = field(default_factory=dict)
 
     def begin(self, device: str, event: Event) -> None:
-        """A device is at an event from now on, beside what it is at already."""
+        """Note that a device is at one more event from now on."""
         self._events.setdefault(device, {})[event.number] = event
 
     def end(self, device: str, event: Event) -> bool:
-        """A device is at an event no longer; False if it was not."""
+        """Take a device from an event; return False if it was not there."""
         if not self.is_at(device, event):
             return False
         del self._events[device][event.number]
@@ -41,19 +41,19 @@ class Assignments:
         return self._events.get(device, {}).get(event.number) is event
 
     def find(self, device: str, number: int) -> Event | None:
-        """The event of that number, if a device is at it."""
+        """Return the event of that number, if a device is at it."""
         return self._events.get(device, {}).get(number)
 
     def all(self, device: str) -> tuple[Event, ...]:
-        """All that a device is at, begun longest ago first."""
+        """Return all that a device is at, begun longest ago first."""
         return tuple(self._events.get(device, {}).values())
 
     def count(self, device: str) -> int:
-        """At how many events a device is."""
+        """Return at how many events a device is."""
         return len(self._events.get(device, ()))
 
     def pairs(self) -> list[tuple[str, Event]]:
-        """Every device with every event it is at."""
+        """Return every device with every event it is at."""
         return [(device, event) for device in self._events for event in self.all(device)]
 
     def __contains__(self, device: object) -> bool:
@@ -135,7 +135,7 @@ class Promises:
     _owed: dict[tuple[str, int], tuple[Promise, float]] = field(default_factory=dict)
 
     def overdue(self, promises: Iterable[Promise], now: float) -> list[Promise]:
-        """All that is owed now; what of it has been so for too long."""
+        """Return all that is owed now; what of it has been so for too long."""
         before = self._owed
         self._owed = {}
         for promise in promises:

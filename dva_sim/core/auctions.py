@@ -54,7 +54,7 @@ class Auctions:
         return True
 
     def no_bid(self, event: int, device: str) -> None:
-        """A device declines to bid, or cannot be reached."""
+        """Note that a device declines to bid, or cannot be reached."""
         auction = self.running.get(event)
         if auction is not None:
             auction.asked.discard(device)

@@ -24,7 +24,7 @@ class AuditTrail:
     _facts: deque[Fact] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
 
     def note(self, fact: Fact) -> None:
-        """Something was decided."""
+        """Note a decision."""
         self.lost += len(self._facts) == MOST_KEPT
         self._facts.append(fact)
 

@@ -67,7 +67,7 @@ def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate])
 
 
 def _everybody(dispatcher: Dispatcher, event: Event, now: float) -> Iterator[m.Candidate]:
-    """All guards and robots."""
+    """Yield all guards and robots."""
     registry = dispatcher.orders.registry
     entries = [
         entry for entry in registry.entries.values() if entry.device.device_type in (GUARD, ROBOT)
@@ -98,7 +98,7 @@ def _ways(dispatcher: Dispatcher, entries: list[DeviceEntry], event: Event) -> l
 def _why_not(
     dispatcher: Dispatcher, entry: DeviceEntry, event: Event, way: float, now: float
 ) -> str:
-    """The first reason why somebody cannot be sent there now; empty: it can."""
+    """Return the first reason why somebody cannot be sent there now; empty: it can."""
     orders = dispatcher.orders
     device = entry.device
     if entry.silent:

@@ -272,7 +272,7 @@ class ControlRooms:
         return looks and event.responder == body.device
 
     def _may_look(self, body: m.Assign, event: Event) -> None:
-        """Nobody is taken from a scene, and from the way only by who knows of it."""
+        """Refuse to take anybody from a scene, or from the way but by who knows of it."""
         who = self._orders.label_of(event.responder or "")
         if event.state is State.CONFIRMED:
             raise _Refused(m.WRONG_MODE, f"event {event.number} is confirmed: somebody has looked")
@@ -413,13 +413,13 @@ class ControlRooms:
     # --- what is kept of it ------------------------------------------------------------
 
     def raised(self, event: Event, sender: m.Device, now: float) -> None:
-        """A control room has reported an event."""
+        """Note that a control room has reported an event."""
         self._note(sender, "raise", now, event=event.number, text=event.kind)
 
     def asked_for_robot(
         self, sender: m.Device, body: m.PermissionRequest, answer: DvaAnswer, now: float
     ) -> None:
-        """A control room has asked for a robot, or a supervisor has taken it from its holder."""
+        """Note that a control room has asked for a robot, or taken it from its holder."""
         forced = body.takeover in ("ask", "force")
         action = "take_over" if forced else "take"
         cause = f"{body.level}, {body.takeover}" if forced else body.level
@@ -434,7 +434,7 @@ class ControlRooms:
         )
 
     def gave_back(self, sender: m.Device, robot: str, now: float) -> None:
-        """A control room needs a robot no longer."""
+        """Note that a control room needs a robot no longer."""
         self._note(sender, "give_back", now, device=robot)
 
     def _decided(

@@ -154,7 +154,7 @@ class Dispatcher:
         return sends
 
     def _advice(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """The policy's, if it makes sense; else the default's."""
+        """Return the policy's, if it makes sense; else the default's."""
         try:
             advice = list(self.policy.advise(situation, rng))
             _check_form(advice, situation)
@@ -165,7 +165,7 @@ class Dispatcher:
         return advice
 
     def _carry_out(self, advice: Sequence[Advice], view: PolicyView, now: float) -> list[Send]:
-        """Nobody is sent to two places, and nothing is given to two."""
+        """Carry out the choice: nobody is sent to two places, and nothing is given to two."""
         taken: set[int] = set()
         given: set[int] = set()
         sends: list[Send] = []
@@ -191,7 +191,7 @@ class Dispatcher:
     # --- what the rules allow; None: they do not -----------------------------------------
 
     def _assign(self, choice: Assignment, view: PolicyView, now: float) -> list[Send] | None:
-        """The orders that an assignment means."""
+        """Return the orders that an assignment means."""
         task = view.situation.tasks[choice.task]
         event = view.events[choice.task]
         entry = view.team.entries[choice.responder]
@@ -237,7 +237,7 @@ class Dispatcher:
         )
 
     def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
-        """The policy has decided: a fact, and what people are compared with later."""
+        """Note the policy's decision: a fact, and what people are compared with later."""
         orders = self.orders
         if not orders.trail.keeps:
             return
@@ -372,7 +372,7 @@ class Patrols:
         return sends
 
     def held(self, send: Send, registry: Registry, sessions: Sessions) -> list[Send]:
-        """A robot has heard who holds it: if that is the DVA, it can be sent now."""
+        """Note that a robot has heard who holds it: if that is the DVA, it can be sent now."""
         entry = registry.entries.get(send.to)
         body = send.body
         own = sessions.permissions.own
@@ -383,7 +383,7 @@ class Patrols:
         return [self._round(entry, body.session)]
 
     def forget(self, robot: str) -> None:
-        """A robot is not known any longer."""
+        """Forget a robot."""
         self._idle_since.pop(robot, None)
         self._on_round.discard(robot)
 

@@ -167,7 +167,7 @@ class Dva:
         return self._with_revocations(sends + self.orders.taken_up(send))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
-        """A robot did not take a grant; it may have said which session would do."""
+        """Note that a robot did not take a grant; it may have said which session would do."""
         floor = reply.content
         if reply.code == m.BAD_SESSION and isinstance(floor, m.SessionFloor):
             again = self.sessions.above(send, floor.session)
@@ -243,7 +243,7 @@ class Dva:
         return self._with_revocations(sends)
 
     def close(self) -> list[Send]:
-        """The DVA closes: all sessions are over."""
+        """End all sessions, as the DVA closes."""
         self.sessions.take_back_everything()
         return self._with_revocations([])
 
@@ -324,7 +324,7 @@ class Dva:
         return DvaAnswer(sends=sends)
 
     def _gone(self, device: str, now: float) -> list[Send]:
-        """A device is there no more: what it held is free, what it did is open to others."""
+        """Drop a device: what it held is free, and what it did is open to others."""
         self.sessions.take_back_all(device)
         self.sensing.forget(device)
         self.sessions.permissions.forget(self.sessions.permissions.own, device)
@@ -336,7 +336,7 @@ class Dva:
         return entry is not None and not entry.silent
 
     def _forget_the_long_silent(self, now: float) -> None:
-        """Those of whom nothing is open; the others last."""
+        """Forget those of whom nothing is open; the others last."""
         late = list(self.registry.long_silent(now))
         for device in self._with_nothing_open(late) if late else ():
             self._forget(device)

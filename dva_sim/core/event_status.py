@@ -54,7 +54,7 @@ def status_of(event: Event, question: Question | None, now: float) -> m.EventSta
 
 
 def event_list(events: Iterable[Event], questions: Questions, now: float) -> m.EventList:
-    """So many of these events as fit into a message."""
+    """Return as many of these events as fit into a message."""
     listed: list[m.EventStatus] = []
     room = LIST_BYTES
     for event in events:
@@ -90,7 +90,7 @@ def _proposed(question: Question | None, now: float) -> m.Proposed | None:
 
 
 def _written(status: m.EventStatus) -> int:
-    """Room for what people have written [B]."""
+    """Return the room for what people have written [B]."""
     last = status.last_decision
     seen = status.acknowledged
     texts = [status.note or "", seen.label if seen else ""]

@@ -368,7 +368,7 @@ class EventTable:
     _changed: dict[int, Event] = field(default_factory=dict)
 
     def get(self, number: int) -> Event | None:
-        """The event of that number, if it is open or was closed lately."""
+        """Return the event of that number, if it is open or was closed lately."""
         return self.open.get(number) or self.closed.get(number)
 
     @property
@@ -377,7 +377,7 @@ class EventTable:
         return len(self.open) >= MOST_OPEN
 
     def near(self, kind: str, position: Position) -> Event | None:
-        """The open event that a report is about, if it is known."""
+        """Return the open event that a report is about, if it is known."""
         if self.merge_distance <= 0:
             return None
         limit = self.merge_distance
@@ -385,7 +385,7 @@ class EventTable:
         return next((e for e in every if apart(e.position, position) < limit), None)
 
     def reported_by(self, source: str, kind: str, position: Position) -> list[Event]:
-        """The open events that a device reported there and has not taken back."""
+        """Return the open events that a device reported there and has not taken back."""
         near = max(self.merge_distance, SAME_SPOT)
         return [
             e
@@ -394,25 +394,25 @@ class EventTable:
         ]
 
     def merge(self, event: Event, severity: float) -> None:
-        """One more report of an event."""
+        """Merge one more report of an event."""
         event.reports += 1
         event.severity = max(event.severity, severity)
         self.touch(event)
 
     def note_source(self, event: Event, source: str, confidence: float) -> None:
-        """A device has reported an event; said twice it is not more certain."""
+        """Note which device has reported an event; said twice it is not more certain."""
         if source in event.sources or len(event.sources) < MOST_SOURCES:
             event.sources[source] = max(confidence, event.sources.get(source, 0.0))
 
     def take_back(self, event: Event, source: str) -> None:
-        """A device does not see it any longer."""
+        """Take back the report of a device that does not see it any longer."""
         event.sources.pop(source, None)
         self.touch(event)
 
     def add(
         self, kind: str, position: Position, severity: float, now: float, contain: bool = False
     ) -> Event:
-        """A new event."""
+        """Return a new event."""
         self.total += 1
         number = self.first + self.total
         event = Event(number, kind, position, severity, contain, waiting_since=now)
@@ -423,7 +423,7 @@ class EventTable:
         return event
 
     def restore(self, event: Event) -> None:
-        """An event that an earlier life of the DVA knew; `counts` and `total` know it already."""
+        """Restore an event of an earlier life of the DVA; `counts` and `total` know it already."""
         (self.open if event.open else self.closed)[event.number] = event
         self.touch(event)
 
@@ -455,7 +455,7 @@ class EventTable:
             self.waiting.pop(event.number, None)
 
     def changes(self) -> list[Event]:
-        """The events that have changed since this was last asked."""
+        """Return the events that have changed since this was last asked."""
         changed = self._changed
         self._changed = {}
         return list(changed.values())
@@ -466,7 +466,7 @@ class EventTable:
 
 
 def apart(a: Position, b: Position) -> float:
-    """Distance of two places that are near each other [m]."""
+    """Return the distance of two places that are near each other [m]."""
     north = (a.latitude - b.latitude) * DEGREE
     east = (a.longitude - b.longitude) * DEGREE * math.cos(math.radians(a.latitude))
     return math.hypot(north, east)

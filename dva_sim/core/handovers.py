@@ -83,7 +83,7 @@ class Handovers:
         return m.Holder(device, label, sent_time(held_for))
 
     def _noted(self, robot: str, session: int, now: float) -> float:
-        """Since when a session is known to hold a robot [s]."""
+        """Return since when a session is known to hold a robot [s]."""
         if self._since.get(robot, (0, 0.0))[0] != session:
             grants = self.sessions.permissions.grants
             if len(self._since) > 2 * len(grants) + 64:
@@ -92,7 +92,7 @@ class Handovers:
         return self._since[robot][1]
 
     def granted(self, robot: str, session: int, now: float) -> None:
-        """Somebody has the robot from now on, or still."""
+        """Note that somebody has the robot from now on, or still."""
         if robot in self.sessions.reserved:
             self.orders.counters["robot handed over"] += 1
         self._noted(robot, session, now)
@@ -103,7 +103,7 @@ class Handovers:
     def wish(
         self, request: m.PermissionRequest, asker: m.Device, holder: m.Holder, now: float
     ) -> tuple[str, list[Send]]:
-        """Somebody wants what another holds: how that stands, in words, and what to send."""
+        """Return how a wish for another's robot stands, in words, and what to send."""
         robot = request.device
         known = self.under_way.get(robot)
         if request.takeover == "force":
@@ -124,7 +124,7 @@ class Handovers:
         return Step.STOPPING
 
     def answered(self, send: Send, gives: bool, now: float) -> list[Send]:
-        """A holder gives its robot up, or does not."""
+        """Take the word of a holder that gives its robot up, or does not."""
         body = send.body
         assert isinstance(body, m.HandoverRequest)
         known = self.under_way.get(body.device)
@@ -138,7 +138,7 @@ class Handovers:
         return []
 
     def _stop(self, robot: str, asker: str, now: float) -> list[Send]:
-        """Nobody may drive it any more; what it was to look at is open to others."""
+        """Let nobody drive it any more; what it was to look at is open to others."""
         self.under_way[robot] = Handover(asker, Step.STOPPING, now + STOP_WITHIN)
         self.sessions.reserved.add(robot)
         sends = self.orders.taken_away(robot, now)
@@ -148,7 +148,7 @@ class Handovers:
         return sends
 
     def seen(self, robot: str, status: m.RobotStatus, now: float) -> None:
-        """A robot says how it is: it may stand by now, and know that its session is over."""
+        """Hear from a robot how it is: it may stand by now, and know that its session is over."""
         known = self.under_way.get(robot)
         if (
             known is None

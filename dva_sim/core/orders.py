@@ -107,7 +107,7 @@ class Orders:
         return self.transition(event, Cause.REDIRECTED, now)
 
     def again(self) -> list[Send]:
-        """All current orders, repeated by a DVA that was restarted."""
+        """Return all current orders, repeated by a DVA that was restarted."""
         sends = []
         for event in self.events.open.values():
             if event.state in LOOKING and event.responder is not None:
@@ -119,7 +119,7 @@ class Orders:
     # --- taken up, or not --------------------------------------------------------------
 
     def taken_up(self, send: Send) -> list[Send]:
-        """Somebody has answered an order or an award with OK."""
+        """Note that somebody has answered an order or an award with OK."""
         event = self._meant(send)
         if event is None:
             return []
@@ -169,7 +169,7 @@ class Orders:
         return self.engaged.is_at(device, event) and device in (event.holder, event.actor)
 
     def departed(self, event: Event, device: str, now: float) -> None:
-        """Somebody has set out."""
+        """Note that somebody has set out."""
         if device == event.actor:
             event.act_taken_up = True
             event.times.setdefault("act_departed", now)
@@ -179,7 +179,7 @@ class Orders:
         self.events.touch(event)
 
     def arrived(self, event: Event, device: str, now: float) -> None:
-        """Somebody says that it is there; that counts as soon as it has told where it is."""
+        """Note that somebody says to be there, which counts once it has told where it is."""
         self.departed(event, device, now)
         goes = device if device == event.actor else event.responder
         if goes is None or self._is_near(event, goes):
@@ -189,7 +189,7 @@ class Orders:
             self._from_afar.add((goes, event.number))
 
     def moved(self, device: str, now: float) -> None:
-        """A device has told where it is: that may be where it said that it was."""
+        """Note where a device is: that may be where it said that it was."""
         for event in self.engaged.all(device) if self._from_afar else ():
             if (device, event.number) in self._from_afar and self._is_near(event, device):
                 self._is_there(event, device, now)
@@ -232,7 +232,7 @@ class Orders:
         return self.transition(event, cause, now, device)
 
     def ends(self, event: Event, device: str, state: str, now: float) -> list[Send]:
-        """Somebody is free again; an event it could not settle is open to others."""
+        """Free somebody; an event that could not be settled is open to others."""
         if state == "declined":
             self._pause(device, now)
         if device == event.actor:
@@ -257,7 +257,7 @@ class Orders:
     # --- taken back --------------------------------------------------------------------
 
     def abandon(self, device: str, now: float) -> list[Send]:
-        """A device is gone: what it was doing is open to others."""
+        """Drop a device that has gone: what it was doing is open to others."""
         return [send for e in self.engaged.all(device) for send in self._abandon(e, device, now)]
 
     def _abandon(self, event: Event, device: str, now: float) -> list[Send]:
@@ -287,7 +287,7 @@ class Orders:
         ]
 
     def take_back(self, now: float) -> list[Send]:
-        """Orders that were not carried out in time are open to others."""
+        """Open orders that were not carried out in time to others."""
         self._pauses = [until for until in self._pauses if until > now]
         late = [(d.device, d.event, f"did not {d.owes}") for d in self._overdue(now)]
         if math.isfinite(self.rules.order_limit):
@@ -327,7 +327,7 @@ class Orders:
 
     @staticmethod
     def _owes(device: str, event: Event) -> str:
-        """Nothing if it is there, or stands by, or an order has not been answered yet."""
+        """Return what is owed: nothing if it is there, or stands by, or has not answered yet."""
         if device == event.actor and event.open:
             taken_up = event.act_taken_up
             step = "act_"
@@ -389,7 +389,7 @@ class Orders:
         )
 
     def taken_away(self, robot: str, now: float) -> list[Send]:
-        """A robot is another's from now on: others have to look at what it was sent to."""
+        """Note a robot's new holder: others have to look at what it was sent to."""
         sends: list[Send] = []
         for event in self.engaged.all(robot):
             looks = event.state in LOOKING
@@ -461,7 +461,7 @@ class Orders:
         return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
 
     def decided(self, event: Event, fact: Fact) -> None:
-        """Something was decided on an event, by whomever."""
+        """Note a decision on an event, by whomever."""
         choice = Choice(
             fact.author,
             fact.label,
@@ -505,7 +505,7 @@ class Orders:
             self._pauses.append(until)
 
     def _release(self, event: Event) -> None:
-        """The order to confirm is over, and with it the right to drive there."""
+        """Release the order to confirm, and with it the right to drive there."""
         if event.operator is not None and event.responder is not None:
             self.sessions.take_back(event.operator, event.responder)
         self._free(event, event.responder, event.operator)

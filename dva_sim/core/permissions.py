@@ -71,12 +71,12 @@ class Access:
     def sensors(
         self, holder: Device, robot: Device, wanted: Sequence[str], now: float
     ) -> tuple[str, ...]:
-        """Those of the wanted sensors that a device may read."""
+        """Return those of the wanted sensors that a device may read."""
         rules = [r for r in self.rules if r.is_about(holder, robot, now)]
         return tuple(s for s in wanted if any(r.sensors is None or s in r.sensors for r in rules))
 
     def ends(self, holder: Device, robot: Device, level: str, now: float) -> float:
-        """Up to when a device may have a level of permission on a robot, as things stand [s]."""
+        """Return up to when a device may have a level of permission on a robot [s]."""
         wanted = _INCLUDES.get(level, {level})
         rules = (r for r in self.rules if r.is_about(holder, robot, now) and wanted <= r.includes)
         return max((r.until for r in rules), default=now)

@@ -213,7 +213,7 @@ class Reports:
 
 
 def _within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event | None:
-    """The nearest event that can be felt at a place."""
+    """Return the nearest event that can be felt at a place."""
     near = [(apart(e.position, place), e.number, e) for e in events if e.kind == kind]
     found = min((entry for entry in near if entry[0] < REACH), default=None)
     return found[2] if found else None

@@ -26,7 +26,7 @@ class Roles:
         return self.known.get(device, ControlRoomRole.LOOK)
 
     def appoint(self, device: str, role: ControlRoomRole | str) -> None:
-        """From now on a device has this role.
+        """Appoint a device to a role from now on.
 
         Raises:
             ValueError: there is no such role.

@@ -61,7 +61,7 @@ class Sensing:
     # --- which sensors there are -------------------------------------------------------
 
     def met(self, robot: str) -> list[Send]:
-        """A robot has registered: it is asked for its sensors if anybody cares."""
+        """Ask a robot that has registered for its sensors, if anybody cares."""
         if not (self._wanted or self.alarms) or robot in self.known or robot in self._asked:
             return []
         self._asked.add(robot)
@@ -78,7 +78,7 @@ class Sensing:
             del self._times[key]
 
     def on_reply(self, robot: str, content: object, now: float) -> None:
-        """A robot has answered, or not; of one that is gone meanwhile nothing is kept."""
+        """Take a robot's answer, or its lack; of one that is gone meanwhile nothing is kept."""
         if robot not in self._asked:
             return
         self._asked.remove(robot)
@@ -91,7 +91,7 @@ class Sensing:
             self._due[robot] = now
 
     def ask_all(self, registry: Registry, robot: str | None) -> list[Send]:
-        """Somebody asks for sensors, of one robot or of all: from now on everyone is asked."""
+        """Ask one robot or all for sensors, for somebody: from now on everyone is asked."""
         self._wanted = True
         self._mute.discard(robot or "")
         robots = (entry.device.id_tag for entry in registry.of_type(ROBOT))
@@ -131,7 +131,7 @@ class Sensing:
         return sends
 
     def permitted(self, send: Send) -> list[Send]:
-        """A robot has heard that the DVA may read its sensors."""
+        """Note that a robot has heard that the DVA may read its sensors."""
         return self._wishes(send.to, send.session) if send.to in self._due else []
 
     def next_due(self) -> float:
@@ -139,7 +139,7 @@ class Sensing:
         return min(self._due.values(), default=math.inf)
 
     def crossed(self, robot: str, value: m.SensorValue) -> SensorAlarm | None:
-        """The alarm that a value gives: once, until the sensor has shown less again."""
+        """Return the alarm that a value gives: once, until the sensor has shown less again."""
         alarm = self.alarms.get(value.sensor)
         if alarm is None:
             return None

@@ -107,7 +107,7 @@ class Sessions:
         return reads or (drives if drives is not None and holder in (None, drives.holder) else None)
 
     def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
-        """The DVA reads sensors of a robot itself: what to tell the robot."""
+        """Read sensors of a robot by the DVA itself; return what to tell the robot."""
         own = self.permissions.own
         grant, _ = self.permissions.request(robot, own, "sensors", sensors)
         assert grant is not None
@@ -115,7 +115,7 @@ class Sessions:
         return Send(robot, notice, grant.session)
 
     def observes(self, robot: str) -> int:
-        """The session in which the DVA reads sensors of a robot; 0: it does not."""
+        """Return the session in which the DVA reads sensors of a robot; 0: it does not."""
         grant = self.permissions.observers.get((robot, self.permissions.own))
         return grant.session if grant is not None else 0
 
@@ -124,7 +124,7 @@ class Sessions:
         return any(send.to == robot for send in self.unacknowledged.values())
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
-        """A holder needs its session no longer; False if it has no such session."""
+        """End a session that its holder needs no longer; return False if there is none."""
         both = (
             self.permissions.grants.get(body.device),
             self.permissions.observers.get((body.device, body.holder)),
@@ -157,7 +157,7 @@ class Sessions:
         self._tell(grant, holder_too=True)
 
     def undelivered(self, send: Send) -> None:
-        """A robot did not take a grant, or did not hear that one is over."""
+        """Note that a robot did not take a grant, or did not hear that one is over."""
         body = send.body
         if isinstance(body, m.PermissionGrant):
             self.permissions.end(body.session)
@@ -189,7 +189,7 @@ class Sessions:
         return Send(send.to, again, grant.session)
 
     def heard(self, send: Send) -> None:
-        """A robot knows that a session is over."""
+        """Note that a robot knows that a session is over."""
         body = send.body
         if isinstance(body, m.PermissionRevocation) and send.to == body.device:
             self.changes += self.unacknowledged.pop(body.session, None) is not None
@@ -206,7 +206,7 @@ class Sessions:
         return held.union(send.to for send in self.unacknowledged.values())
 
     def forget(self, robot: str) -> None:
-        """A robot is not known any longer: its holders hear that, and it, if it comes back."""
+        """Forget a robot: its holders hear that, and it, if it comes back."""
         for grant in [g for g in self.permissions.all() if g.robot == robot]:
             self.revoke(grant)
 
@@ -315,16 +315,16 @@ class Permissions:
         return renewed
 
     def _new_session(self, only_sensors: bool) -> int:
-        """Only the right to drive is fenced by the height of its session."""
+        """Return a new session: only the right to drive is fenced by its height."""
         self.count += not only_sensors
         return self.count << LOW_BITS | self.draw()
 
     def all(self) -> list[Grant]:
-        """Every grant that holds."""
+        """Return every grant that holds."""
         return [*self.grants.values(), *self.observers.values()]
 
     def restore(self, grant: Grant) -> None:
-        """A grant of an earlier life of the DVA holds on."""
+        """Restore a grant of an earlier life of the DVA."""
         self.changes += 1
         if grant.level == "sensors":
             self.observers[grant.robot, grant.holder] = grant
@@ -332,7 +332,7 @@ class Permissions:
             self.grants[grant.robot] = grant
 
     def end(self, session: int) -> None:
-        """A single grant is over, or never began."""
+        """End a single grant, or one that never began."""
         self.changes += 1
         _drop_session(self.grants, session)
         _drop_session(self.observers, session)

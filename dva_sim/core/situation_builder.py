@@ -36,12 +36,12 @@ class KnownTeam:
     operators: list[DeviceEntry]
 
     def idle(self) -> set[str]:
-        """Ids of those who do nothing."""
+        """Return ids of those who do nothing."""
         pairs = zip(self.entries, self.engaged, strict=True)
         return {entry.device.id_tag for entry, event in pairs if event is None}
 
     def starts(self) -> list[Start]:
-        """From where they would set out."""
+        """Return from where they would set out."""
         return [
             Start(e.device.id_tag, KINDS[e.device.device_type], e.position, a is not None)
             for e, a in zip(self.entries, self.engaged, strict=True)
@@ -91,23 +91,23 @@ class SituationBuilder:
         return PolicyView(self._situation(events, team, now), events, team)
 
     def idle(self, now: float) -> set[str]:
-        """Ids of guards and robots that could be sent somewhere now."""
+        """Return ids of guards and robots that could be sent somewhere now."""
         return self._team(now).idle()
 
     # --- who is on the way to wait somewhere ---------------------------------------------
 
     def sends_to_wait(self, guard: str, station: int, eta: float, now: float) -> None:
-        """A guard is on its way to a station; it counts as given up when it is very late."""
+        """Note that a guard is on its way to a station; a very late one is given up."""
         self._bound_for[guard] = station, now + LATE * eta + SETTLED
 
     def forget_move(self, guard: str) -> None:
-        """A guard goes elsewhere, did not take a relocation, or has forgotten it."""
+        """Forget a move: the guard goes elsewhere, did not take it, or has forgotten it."""
         self._bound_for.pop(guard, None)
 
     # --- what there is to do, and who can ------------------------------------------------
 
     def _tasks(self) -> list[Event]:
-        """Events that somebody could do something about, detected longest ago first."""
+        """Return events that somebody could do something about, detected longest ago first."""
         events = self.orders.events
         rules = self.orders.rules
         if not (rules.containment or self.policy.preempts):
@@ -152,7 +152,7 @@ class SituationBuilder:
         return KnownTeam(entries, engaged, operators)
 
     def _free(self, entries: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
-        """Those who may be given an order, in order of registration."""
+        """Return those who may be given an order, in order of registration."""
         is_held = self.orders.sessions.is_held
         engaged = self.orders.engaged
         is_stopped = self.orders.emergencies.holds
@@ -166,7 +166,7 @@ class SituationBuilder:
         return sorted(free, key=_place)
 
     def operators(self, now: float) -> list[DeviceEntry]:
-        """Operators who may be given a robot now, as `_hands` has them."""
+        """Return operators who may be given a robot now, as `_hands` has them."""
         return self._hands(self.orders.registry.of_type(OPERATOR), now)
 
     def _hands(self, operators: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
@@ -269,7 +269,7 @@ class SituationBuilder:
 
 
 def same_place(a: m.Position, b: m.Position) -> bool:
-    """Within a few metres."""
+    """Return True within a few metres."""
     return abs(a.latitude - b.latitude) + abs(a.longitude - b.longitude) < SAME_PLACE
 
 
@@ -283,7 +283,7 @@ def _sealed(array: Floats) -> Floats:
 def _leave_out_who_failed(
     event: Event, starts: Sequence[Start], distance: Floats, eta: Floats
 ) -> None:
-    """A responder that gave an event back goes again only if nobody else can."""
+    """Leave out responders that gave an event back, unless nobody else can go."""
     failed = np.array([s.device in event.failed for s in starts], dtype=bool)
     if np.isfinite(distance[~failed]).any():
         distance[failed] = eta[failed] = np.inf

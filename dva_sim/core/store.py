@@ -131,7 +131,7 @@ class Store:
         self._file.close()
 
     def copy(self) -> bytes:
-        """The file as it is now."""
+        """Return the file as it is now."""
         return self._file.serialize()
 
     # --- to the file -------------------------------------------------------------------

@@ -37,7 +37,7 @@ class Travel(Protocol):
     def __call__(
         self, starts: Sequence[Start], goals: Sequence[m.Position]
     ) -> tuple[Floats, Floats]:
-        """Path length [m], and expected time to arrival with mobilisation [s].
+        """Return the path length [m], and expected time to arrival with mobilisation [s].
 
         Both of shape `(goals, starts)`; infinite where no path exists.
         """

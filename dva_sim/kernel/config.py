@@ -164,7 +164,7 @@ def _dotted(path: KeyPath) -> str:
 
 
 def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
-    """Every field of a model, by its dotted key, each followed by the fields of its own model."""
+    """Yield every field of a model, by its dotted key, each followed by those of its model."""
     for name, info in _fields(model).items():
         yield f"{above}{name}", info
         inner = model_in(info.annotation)

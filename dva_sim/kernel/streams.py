@@ -42,6 +42,6 @@ class Streams:
 
 
 def derive_seed(*parts: object) -> int:
-    """A 63-bit seed from names and numbers, the same on every machine and in every process."""
+    """Return a 63-bit seed from names and numbers, the same on every machine."""
     text = "\x1f".join(str(p) for p in parts).encode()
     return int.from_bytes(hashlib.sha256(text).digest()[:8], "big") >> 1

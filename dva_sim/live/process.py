@@ -266,7 +266,7 @@ def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
 def _joining(
     network: RealNetwork, options: LiveOptions, name: str, of: int
 ) -> Callable[[str, int], str]:
-    """Gives each new device of this process two ports, and its address."""
+    """Return a function that gives each new device of this process two ports, and its address."""
     given = options.port
 
     def join(kind: str, number: int) -> str:

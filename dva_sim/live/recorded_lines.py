@@ -199,7 +199,7 @@ class RunLines:
         )
 
     def _traffic(self) -> Iterator[Sent]:
-        """Messages; the receiver of a frame is the robot's driver, or empty without one."""
+        """Yield messages; the receiver of a frame is the robot's driver, or empty without one."""
         for sent in self.recorder.traffic or ():
             if sent.destination:
                 yield sent
@@ -282,7 +282,7 @@ class RunLines:
         self.audit.append((float(row["time_s"]), row))
 
     def _cameras(self, _: str) -> None:
-        """Pictures are no part of a recording."""
+        """Leave out pictures, which are no part of a recording."""
 
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))

@@ -173,7 +173,7 @@ class LiveRecorder(Recorder):
         self.put("view", robot, [time, x, y, heading])
 
     def message(self, node: str, payload: Any, sent: bool) -> None:
-        """A node of this process sends a message, or takes one."""
+        """Note a message that a node of this process sends or takes."""
         now = self._clock.now
         if isinstance(payload, CameraFrame):
             if self.keeps or node not in self._filmed:  # the rules need the clock behind one
@@ -330,7 +330,7 @@ def _lock(file: IO[bytes], path: Path) -> None:
 
 
 def _emptied(path: Path) -> IO[bytes]:
-    """A file to write, of which nothing is left if it takes a byte.
+    """Return a file to write, of which nothing is left if it takes a byte.
 
     Raises:
         ConfigError: it does not, or another process has it.

@@ -152,7 +152,7 @@ class RunningChannels:
         return channels.sent_message(sent, channels.names_of(self._labels))
 
     def _seen(self, when: float, word: str, content: dict[str, Any]) -> Iterator[ChannelMessage]:
-        """A robot has accepted a command: how long that was on its way."""
+        """Yield how long a command that a robot has accepted was on its way."""
         if word == "accepted":
             issued = self._sent.pop((content["source"], content["message_id"]), None)
             robot = self._labels.get(content["robot"], content["robot"])

@@ -350,7 +350,7 @@ def free_pairs(count: int) -> list[int]:
 
 
 def _end_of(part: str) -> str:
-    """The end of an emulated link that a part is at: its robots are at the far one."""
+    """Return the end of an emulated link that a part is at: its robots are at the far one."""
     return FAR if part == "world" else NEAR
 
 

@@ -138,7 +138,7 @@ class Stream:
             self.deliver(ready)
 
     def _measure(self, rtt: float) -> None:
-        """RFC 6298, equations 2.2 and 2.3."""
+        """Measure a round trip: RFC 6298, equations 2.2 and 2.3."""
         srtt = self._srtt
         if srtt is None:
             self._srtt = rtt
@@ -163,13 +163,13 @@ class _PlainEnd:
     _link: Link
 
     def pause(self) -> None:
-        """Nothing waits here: what a program cannot take is for it to drop."""
+        """Do nothing: what a program cannot take is for it to drop."""
 
     def resume(self) -> None:
-        """Nothing to resume; see `pause`."""
+        """Do nothing; see `pause`."""
 
     def backlog_bytes(self, now: float) -> float:
-        """Bytes that wait before the link [B]."""
+        """Return bytes that wait before the link [B]."""
         return self._link.backlog_bytes(now)
 
 
@@ -256,7 +256,7 @@ class Connection:
         self._then()
 
     def _is_accepted(self, _: object) -> None:
-        """The last word of the opener's handshake has reached the peer."""
+        """Note that the last word of the opener's handshake has reached the peer."""
         self._to_peer.deliver = self._handlers[0]
         assert self._accepted is not None
         self._accepted()
@@ -302,7 +302,7 @@ class DatagramEnd(_PlainEnd):
         return True
 
     def take(self, payload: Any) -> None:
-        """A message has arrived."""
+        """Take a message that has arrived."""
         if not self.closed:
             self._deliver(payload)
 
@@ -332,17 +332,17 @@ class DatagramConnection:
     def open(
         self, then: Callable[[], object], accepted: Callable[[], object] | None = None
     ) -> None:
-        """Both may send at once."""
+        """Let both send at once."""
         then()
         if accepted is not None:
             accepted()
 
     def close(self) -> None:
-        """The opener closes its socket: what it has sent still arrives, no answer does."""
+        """Close the opener's socket: what it has sent still arrives, no answer does."""
         self.opener.closed = True
 
     def drop(self) -> None:
-        """Both are closed."""
+        """Close both ends."""
         self.opener.closed = self.peer.closed = True
 
 
@@ -449,7 +449,7 @@ class Connector:
         at_opener: Deliver,
         publishes: bool = False,
     ) -> AnyConnection:
-        """A connection that is still to be opened.
+        """Return a connection that is still to be opened.
 
         Args:
             clock: The run's clock.

@@ -114,7 +114,7 @@ class KeyRing:
         return sorted(self._public)
 
     def public(self, device: str) -> bytes:
-        """The public key of a device.
+        """Return the public key of a device.
 
         Raises:
             ConfigError: it is not in the folder.
@@ -125,7 +125,7 @@ class KeyRing:
             raise ConfigError(f"there is no public key of {device}", self.folder) from None
 
     def pair(self, device: str) -> tuple[bytes, bytes]:
-        """The public and the secret key of a device.
+        """Return the public and the secret key of a device.
 
         Raises:
             ConfigError: one is missing or broken, they do not match, or others may read the
@@ -146,7 +146,7 @@ class KeyRing:
         return self._pairs[device]
 
     def owner(self, public_key: bytes) -> str | None:
-        """The device that has this public key, given as 32 bytes or as 40 letters."""
+        """Return the device that has this public key, given as 32 bytes or as 40 letters."""
         key = public_key if len(public_key) == _KEY_LENGTH else z85.encode(public_key)
         return self._owners.get(key)
 
@@ -239,7 +239,7 @@ def _read_secret(file: Path) -> tuple[str, bytes, bytes]:
 
 
 def _fields(file: Path) -> dict[str, str]:
-    """The `name = "value"` lines of a file; a key may hold `=` and `#`."""
+    """Return the `name = "value"` lines of a file; a key may hold `=` and `#`."""
     _require_curve()
     try:
         lines = file.read_text(encoding="ascii").splitlines()
@@ -286,7 +286,7 @@ def _check_owner(file: Path, device: str, owner: str) -> None:
 
 
 def _stem(device: str) -> str:
-    """The id as a file name: not every file system takes a colon."""
+    """Return the id as a file name: not every file system takes a colon."""
     return device.replace(":", "-")
 
 

@@ -78,7 +78,7 @@ class RequestTap(Protocol):
         """Let the service take the request, and see its answer."""
 
     def heard(self, publisher: str, payload: Any) -> None:
-        """A publication has reached the node."""
+        """Take a publication that has reached the node."""
 
 
 class RequestTransport(Protocol):
@@ -112,7 +112,7 @@ class Transport(CommandSockets, Protocol):
         """Say where a node is found, as in its registration."""
 
     def forget(self, node: str) -> None:
-        """A node is not needed any longer: nobody is connected to it, or will be."""
+        """Forget a node to which nobody is connected, or will be."""
 
     def serve(self, node: str, service: Service) -> None:
         """Let `service` take the requests to `node`."""
@@ -214,13 +214,13 @@ class Requester:
         self._fill()
 
     def renew(self) -> None:
-        """The peer is somewhere else: what is under way is sent again, over a new connection."""
+        """Renew the connection to a peer elsewhere: what is under way is sent again."""
         self._disconnect()
         for asked in list(self._open.values()):
             self._attempt(asked)
 
     def give_up(self) -> None:
-        """The peer is gone for good: whatever waits has failed."""
+        """Give up a peer that has gone for good: whatever waits has failed."""
         waiting = [*self._open.values(), *self._queue]
         self.close()
         for asked in waiting:
@@ -267,7 +267,7 @@ class Requester:
         self._fill()
 
     def _look_at_deadlines(self) -> None:
-        """The first deadline is reached; those of what was answered meanwhile need no event.
+        """Look at the deadlines once the first is reached; answered ones need no event.
 
         One event for all: a timer for each request costs more than the request.
         """

@@ -164,7 +164,7 @@ class Condition:
         return hashlib.sha256(text.encode()).hexdigest()[:8]
 
     def link(self, late_s: float = 0.0) -> LinkConfig:
-        """The link of the condition, alike in both directions, with some delay added [s]."""
+        """Return the link of the condition, alike in both directions, with some delay added [s]."""
         bursts = self.burst_pkts
         return LinkConfig(
             delay_s=self.delay_ms / 1000.0 + late_s,
@@ -177,13 +177,13 @@ class Condition:
         )
 
     def to_row(self) -> dict[str, str]:
-        """The columns of the condition as a table holds them."""
+        """Return the columns of the condition as a table holds them."""
         row = {name: _written(name, getattr(self, name)) for name in CONDITION}
         return row | {"pattern": _WRITTEN[self.pattern]}
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Condition:
-        """The condition of a row read from a table; other columns do not matter.
+        """Return the condition of a row read from a table; other columns do not matter.
 
         Raises:
             ConfigError: a value is not as it should be.
@@ -321,7 +321,7 @@ class RunLog:
 
     @classmethod
     def of(cls, notes: Iterable[Note]) -> RunLog:
-        """The log that both programs' notes come to."""
+        """Return the log that both programs' notes come to."""
         times: dict[NoteKind, list[tuple[int, float]]] = {kind: [] for kind in NoteKind}
         for kind, number, at in notes:
             times[kind].append((number - 1, at))
@@ -349,7 +349,7 @@ class RunLog:
 
 
 def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
-    """Every measure of a run, times in [ms], rates in [1/s].
+    """Return every measure of a run, times in [ms], rates in [1/s].
 
     - `n_sent`, `send_hz`: commands sent for the first time within the window;
     - `n_applied`: applications within the window, repetitions included;

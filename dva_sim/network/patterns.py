@@ -74,13 +74,13 @@ class Line(Protocol):
         """Return the phone's present command, if the app keeps sending; else the command itself."""
 
     def supersede(self, command: Command) -> None:
-        """A command is not sent, since a newer one took its place: it is counted."""
+        """Count a command that is not sent, since a newer one took its place."""
 
     def code_of(self, reply: bytes) -> int | None:
         """The code in a reply, see `dva_sim.protocol.messages`; None if it cannot be read."""
 
     def lost(self, why: str = "") -> None:
-        """Nobody obeys any more: the app alerts, and the drive ends."""
+        """Alert, as nobody obeys any more, and end the drive."""
 
 
 class Pattern(ABC):
@@ -115,12 +115,12 @@ class Pattern(ABC):
     line: Line
 
     def begin(self, line: Line) -> None:
-        """A drive begins: open what is needed."""
+        """Begin a drive: open what is needed."""
         self.line = line
 
     @abstractmethod
     def offer(self, command: Command) -> None:
-        """The app has made a command: send it, keep it for later, or supersede it."""
+        """Send a command that the app has made, keep it for later, or supersede it."""
 
     def end(self) -> None:  # noqa: B027 (most patterns send nothing by themselves)
         """Stop sending: the drive is over."""
@@ -151,7 +151,7 @@ class Requested(Pattern):
         self.waiting = command
 
     def _answered(self, _: bytes) -> None:
-        """A command that waited goes now: the newest value if the app keeps sending anyway."""
+        """Send a command that waited: the newest value if the app keeps sending anyway."""
         waiting = self.waiting
         self.waiting = None
         if waiting is not None:

@@ -105,7 +105,7 @@ class RealNetwork(ABC):
 
     @abstractmethod
     def ready(self, node: str, topic: str, size: int) -> bool:
-        """True if a topic has a subscriber, and a payload of this size need not wait."""
+        """Return True if a topic has a subscriber, and a payload of this size need not wait."""
 
     @abstractmethod
     def subscribe(
@@ -114,7 +114,7 @@ class RealNetwork(ABC):
         """Subscribe a node to a topic of a publisher."""
 
     def note(self, node: str, payload: Any, sent: bool = True) -> None:
-        """Somebody may want to know what is said here."""
+        """Note what is said here, for somebody who may want to know."""
         if self.watcher is not None:
             self.watcher(node, payload, sent)
 

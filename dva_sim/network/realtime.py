@@ -85,7 +85,7 @@ class Poller:
         return more
 
     def read_out(self, source: Socket) -> None:
-        """A socket has no more to read until its file says so: it need not be asked."""
+        """Note that a socket has no more to read until its file says so."""
         self._ask.pop(source, None)
 
     def poll(self, wait: float) -> list[Any]:
@@ -158,7 +158,7 @@ class LiveClock(Clock):
             self._poller.unregister(source)
 
     def look(self, source: Any) -> None:
-        """A socket was used: what it has to read may be told by nothing else."""
+        """Look at a socket that was used: what it has to read may be told by nothing else."""
         self._poller.look(source)
 
     def has_more(self, source: Socket) -> bool:
@@ -166,7 +166,7 @@ class LiveClock(Clock):
         return self._poller.has_more(source)
 
     def read_out(self, source: Socket) -> None:
-        """A socket that is watched has no more to read until its file says so."""
+        """Note that a watched socket has no more to read until its file says so."""
         self._poller.read_out(source)
 
     def stop(self) -> None:
@@ -302,12 +302,12 @@ class PacedClock(LiveClock):
         self._halted = self._halted if paused is None else paused
 
     def go(self) -> None:
-        """Virtual time goes on from where it is, whatever real time has passed: it begins now."""
+        """Let virtual time go on from where it is, whatever real time has passed."""
         self._rebase(int(self._now_us))
         self._worst = 0.0
 
     def worst_lag(self) -> float:
-        """By how much an event has come too late at most since the last time of asking [s]."""
+        """Return how late an event has come at most since the last time of asking [s]."""
         worst = self._worst
         self._worst = 0.0
         return worst
@@ -361,7 +361,7 @@ class PacedClock(LiveClock):
         self._set(int(max(self._now_us, min(self._real(), end, env.peek()))))
 
     def _look_behind(self, due: int) -> None:
-        """By how much an event comes too late that was due at a time."""
+        """Note how late an event comes that was due at a time."""
         behind = (self._real() - due) / US / self._factor
         if behind > self._worst:
             self._worst = behind

@@ -106,7 +106,7 @@ class RequestWindow:
         self._round_began = now
 
     def _youngest(self, round_trip: float, rate: float) -> int:
-        """The window with the least wait in a queue and half a time between commands."""
+        """Return the window with the least wait in a queue and half a time between commands."""
         few = max(1, int(round_trip * rate))
 
         def age(size: int) -> float:

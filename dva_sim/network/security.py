@@ -177,7 +177,7 @@ def at_client(has_keys: bool, device: str, peer: str, event: int, code: int) -> 
 
 
 def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
-    """One end has keys and the other has none."""
+    """Return True if one end has keys and the other has none."""
     if not has_keys:
         return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
     return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
@@ -290,7 +290,7 @@ class Security:
         self._watch(socket, device, peer)
 
     def sockets(self) -> list[Socket]:
-        """The sockets that `handle` wants; they are in the poller already."""
+        """Return the sockets that `handle` wants; they are in the poller already."""
         zap = [] if self._zap is None else [self._zap]
         return [*self._watches, *self._greetings, *zap]
 
@@ -307,7 +307,7 @@ class Security:
         return True
 
     def sender(self, frame: zmq.Frame) -> str | None:
-        """Sender of a message by the key in its last frame; None: the key is unknown.
+        """Return the sender of a message by the key in its last frame; None: the key is unknown.
 
         The frame must have been received with `copy=False`.
         """
@@ -359,7 +359,7 @@ class Security:
             self._zap = None
 
     def _open_zap(self) -> Socket:
-        """The socket that libzmq asks, by its name, whether a key is good."""
+        """Return the socket that libzmq asks, by its name, whether a key is good."""
         zap = self._context.socket(zmq.REP)
         zap.setsockopt(zmq.LINGER, 0)
         try:

@@ -27,7 +27,7 @@ def next_of(socket: Socket) -> list[bytes] | None:
 
 
 def receive(socket: Socket) -> list[bytes] | None:
-    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
+    """Return a message, if there is one: what a REQ socket had may be the copy of a reply."""
     try:
         parts, last = receive_parts(socket)
         if last.more:
@@ -38,7 +38,7 @@ def receive(socket: Socket) -> list[bytes] | None:
 
 
 def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
-    """A received message: its parts, and the last frame read, which names the sender's key.
+    """Return a received message: its parts, and the last frame read, which names the sender's key.
 
     A frame says whether it is the last one at half the price of asking the socket, as
     `recv_multipart` does. Where it is not, the message has more parts than are read: see

@@ -44,7 +44,7 @@ from dva_sim.network.socket_io import (
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
-    """Socket options by number; what the kernel is to choose is left out."""
+    """Return the socket options by number; what the kernel is to choose is left out."""
     options = {
         zmq.SNDHWM: zeromq.high_water_mark,
         zmq.RCVHWM: zeromq.high_water_mark,
@@ -109,7 +109,7 @@ class ReqWire(SocketWire):
         self._network.send(self._socket, [data], look=False)
 
     def _replies(self) -> None:
-        """There is one at most: asking whether there are more would delay every command."""
+        """Read the one reply there is at most: asking for more would delay every command."""
         frames = receive(self._socket)
         self._network.clock.read_out(self._socket)
         if frames is not None:
@@ -421,7 +421,7 @@ class SocketNetwork(RealNetwork):
         sender: str | None,
         origin: str,
     ) -> None:
-        """One request: its route back, an empty frame, and one frame with the message."""
+        """Read one request: its route back, an empty frame, and one frame with the message."""
         if node not in self._services or b"" not in parts:
             self.counters["requests of another form"] += 1
             return
@@ -493,7 +493,7 @@ class SocketNetwork(RealNetwork):
         return socket
 
     def client(self, kind: int, node: str, peer: str) -> Socket:
-        """A socket of `node`, connected to `peer` if there is a way to it."""
+        """Return a socket of `node`, connected to `peer` if there is a way to it."""
         socket = self._socket(kind, CLIENT)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
@@ -588,7 +588,7 @@ class SocketNetwork(RealNetwork):
             self._close(socket)
 
     def _refused(self, refusal: Refusal) -> None:
-        """A connection could not be made: say so, and try again where ZeroMQ does not."""
+        """Say that a connection was refused, and try again where ZeroMQ does not."""
         self._tell(str(refusal))
         if refusal.gave_up and refusal.peer is not None:
             self.clock.call_after(RETRY, self._retry, refusal.device, refusal.peer)
@@ -603,7 +603,7 @@ class SocketNetwork(RealNetwork):
 
 
 def _text(option: object) -> str:
-    """The text of a socket option, which pyzmq gives as bytes."""
+    """Return the text of a socket option, which pyzmq gives as bytes."""
     return option.decode() if isinstance(option, bytes) else str(option)
 
 

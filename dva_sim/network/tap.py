@@ -90,7 +90,7 @@ class Tap:
         self._on_exchange(exchange)
 
     def heard(self, publisher: str, payload: Any) -> None:
-        """A publication has reached the node; pictures are none."""
+        """Take a publication that has reached the node; pictures are none."""
         if self.publications and isinstance(payload, bytes):
             exchange = self._new(payload, publisher)
             exchange.published = True

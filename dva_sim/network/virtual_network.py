@@ -109,7 +109,7 @@ class VirtualNetwork:
         return VirtualSubscription(self, node, publisher, topic, handler)
 
     def leave(self, node: str) -> None:
-        """A node crashes: it takes no requests, and the connections to it are gone."""
+        """Let a node crash: it takes no requests, and the connections to it are gone."""
         self._gone.add(node)
         for client in self._clients[node]:
             client.drop()
@@ -122,12 +122,12 @@ class VirtualNetwork:
                 self.clock.call_after(RECONNECT, client.reopen)
 
     def remember(self, client: VirtualClient) -> None:
-        """Somebody wants something of a node."""
+        """Remember that somebody wants something of a node."""
         self._clients[client.peer][client] = None
         self._wanted.clear()
 
     def release(self, client: VirtualClient) -> None:
-        """Somebody wants nothing more of a node."""
+        """Release a node of which somebody wants nothing more."""
         self._clients[client.peer].pop(client, None)
         self._wanted.clear()
 
@@ -165,7 +165,7 @@ class VirtualClient:
         self._open()
 
     def drop(self) -> None:
-        """The connection breaks; what was under way is lost."""
+        """Break the connection; what was under way is lost."""
         self.connection.drop()
         self._is_up = False
 
@@ -243,7 +243,7 @@ class VirtualWire(VirtualClient):
             self._network.traffic(self._network.clock.now, self.node, self.peer, size, data)
 
     def _new_connection(self) -> AnyConnection:
-        """A reply goes back over the connection that its request came by, or nowhere."""
+        """Return a reply over the connection that its request came by, or nowhere."""
         network = self._network
 
         def at_peer(payload: tuple[int, bytes]) -> None:

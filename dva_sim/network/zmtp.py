@@ -78,7 +78,7 @@ class Pipe(Generic[T]):
         return True
 
     def take(self) -> T | None:
-        """The oldest message, if there is one."""
+        """Return the oldest message, if there is one."""
         if not self._items:
             return None
         item = self._items.popleft()
@@ -119,7 +119,7 @@ Then = Callable[[], object]
 
 
 def framed(size: int) -> int:
-    """Bytes on the wire of a frame of `size` bytes [B]."""
+    """Return bytes on the wire of a frame of `size` bytes [B]."""
     return size + 9 if size > 255 else size + 2
 
 
@@ -192,11 +192,11 @@ class ZmtpEnd:
         return True
 
     def pause(self) -> None:
-        """The program takes nothing more: the decoder stops, and keeps what it has read."""
+        """Stop the decoder, which keeps what it has read: the program takes nothing more."""
         self._paused = True
 
     def resume(self) -> None:
-        """The program takes messages again."""
+        """Let the program take messages again."""
         if self._paused:
             self._paused = False
             self._read()
@@ -204,14 +204,14 @@ class ZmtpEnd:
                 self._end()
 
     def backlog_bytes(self, now: float) -> float:
-        """Bytes that wait to be sent, here and before the link [B]."""
+        """Return bytes that wait to be sent, here and before the link [B]."""
         waiting = sum(size for _, size in self.pipe) + self._rest + self._batch
         return waiting + self._tcp.unsent + self._link.backlog_bytes(now)
 
     # --- the handshake -------------------------------------------------------------------
 
     def begin(self) -> None:
-        """TCP is there: say the signature, the rest as the other end is heard."""
+        """Begin on TCP: say the signature, the rest as the other end is heard."""
         self._say(SIGNATURE)
         self._read()
 
@@ -284,7 +284,7 @@ class ZmtpEnd:
             self._tcp.finish()
 
     def _end(self) -> None:
-        """The other end has gone; it is noticed when all that came before is read."""
+        """End once all that came before is read: the other end has gone."""
         self._over = True
         self._read()
         if not (self.closed or self._paused):
@@ -335,10 +335,10 @@ class ZmtpConnection:
         self._tcp.open(self.opener.begin, self.peer.begin)
 
     def close(self) -> None:
-        """The opener closes its socket; what TCP has of it still arrives at the peer."""
+        """Close the opener's socket; what TCP has of it still arrives at the peer."""
         self.opener.close()
 
     def drop(self) -> None:
-        """The connection breaks: what is under way is lost."""
+        """Break the connection: what is under way is lost."""
         self.opener.closed = self.peer.closed = True
         self._tcp.close()

@@ -39,7 +39,7 @@ def tree() -> etree._ElementTree:
 
 @cache
 def facets(name: str) -> dict[str, list[str]]:
-    """All that restricts a simple type, the narrowest first, and `base`, what it starts from."""
+    """Return what restricts a simple type, the narrowest first, and `base`, its origin."""
     found: dict[str, list[str]] = {}
     while (restriction := _restrictions().get(name)) is not None:
         for facet in restriction.iterchildren(f"{_XS}*"):
@@ -71,7 +71,7 @@ def choices(name: str) -> list[str]:
 
 
 def pattern(name: str) -> str:
-    """The form of a type's text as a regular expression, without its length and without groups."""
+    """Return the form of a type's text as a regular expression without length and groups."""
     form = facets(name)["pattern"][0]
     return form.replace("(", "(?:").replace(r"\P{Cc}", _CHARACTER)
 

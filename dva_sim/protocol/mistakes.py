@@ -195,7 +195,7 @@ def _explain(element: etree._Element, entry: Any) -> str:
 
 
 def _walk(data: bytes) -> tuple[list[_Place], int | None]:
-    """The place of every element in the order of the file, and the byte where that had to end."""
+    """Return the place of every element in file order, and the byte where it had to end."""
     parser = expat.ParserCreate("UTF-8")
     parser.buffer_text = False  # else text is told where the next element begins
     places: list[_Place] = []

@@ -65,7 +65,7 @@ def placed(time: float, moved: Sequence[tuple[str, TrackPoint]]) -> Iterator[Cha
 
 
 def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
-    """The points of a track between which everything lies on straight lines.
+    """Yield the points of a track between which everything lies on straight lines.
 
     While somebody stands still: the first and the last point, and one for each `ALIVE_S`.
     """
@@ -131,7 +131,7 @@ DIGITS = 11  # of the 23 binary ones of a number: one part in 4000, and half the
 
 
 def grids(playback: Playback) -> Iterator[ChannelMessage]:
-    """All fields of the hazards there are, as far as they are not zero."""
+    """Yield all fields of the hazards there are, as far as they are not zero."""
     real = sorted((i for i in playback.incidents if not i.false_alarm), key=lambda i: i.kind)
     whats = dict.fromkeys(what for incident in real for what in incident.hazard.shows)
     west, south, east, north = playback.site.extent
@@ -187,7 +187,7 @@ LEAST_GROWTH = 0.05  # less is not drawn again [m]
 
 
 def bodies(playback: Playback) -> Iterator[ChannelMessage]:
-    """Everybody, in a frame that moves with them; those who leave vanish."""
+    """Yield everybody, in a frame that moves with them; those who leave vanish."""
     tracks = playback.recorder.tracks
     for name, track in tracks.items():
         robot = playback.robot_named(name)
@@ -199,12 +199,12 @@ def bodies(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def ground(playback: Playback) -> Iterator[ChannelMessage]:
-    """The site, which stands still."""
+    """Yield the site, which stands still."""
     yield plan(playback.site)
 
 
 def plan(site: Site) -> ChannelMessage:
-    """Walls, exits and names of rooms."""
+    """Return walls, exits and names of rooms."""
     middles = [(r.name, r.polygon.mean(axis=0)) for r in site.rooms]
     lines = [_lines(site.walls.tolist(), WALL), _lines([e.ends for e in site.exits], EXIT)]
     texts = [_words(name, float(x), float(y)) for name, (x, y) in middles]
@@ -226,12 +226,12 @@ def hazards(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def disc(time: float, number: int, hazard: Hazard) -> ChannelMessage:
-    """A hazard as it is drawn, by its number from 1."""
+    """Return a hazard as it is drawn, by its number from 1."""
     return _update(time, _disc(f"hazard-{number}", time, hazard, hazard.radius(time)))
 
 
 def contained(time: float, number: int) -> ChannelMessage:
-    """A hazard is drawn no longer."""
+    """Return the removal of a hazard."""
     return removal(time, f"hazard-{number}")
 
 
@@ -278,7 +278,7 @@ def _update(time: float, entity: dict[str, Any]) -> ChannelMessage:
 
 
 def removal(time: float, name: str) -> ChannelMessage:
-    """Somebody or something is drawn no longer."""
+    """Return the removal of somebody or something that is drawn no longer."""
     deletion = {"timestamp": messages.stamp(time), "type": 0, "id": name}
     return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
 
@@ -297,7 +297,7 @@ def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str,
 
 
 def body(time: float, name: str, radius: float = PERSON) -> ChannelMessage:
-    """Somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
+    """Return somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
     kind = name.rpartition("-")[0]
     known = kind if kind in TALL else "robot"
     tall = TALL[known]
@@ -369,13 +369,13 @@ LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is f
 
 
 def story_messages(playback: Playback) -> Iterator[ChannelMessage]:
-    """The timeline."""
+    """Yield the timeline."""
     for moment in playback.recorder.timeline:
         yield log(moment)
 
 
 def log(moment: Moment) -> ChannelMessage:
-    """A line of the timeline."""
+    """Return a line of the timeline."""
     return stamped(
         moment.time,
         STORY,
@@ -403,7 +403,7 @@ def fact_message(fact: Fact) -> ChannelMessage:
 
 
 def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
-    """The fact that a message of `facts` holds."""
+    """Return the fact that a message of `facts` holds."""
     names = {written: name for name, written in _IN_SECONDS.items()}
     held = {names.get(name, name): value for name, value in content.items() if name != "timestamp"}
     return Fact(time=time, **held)
@@ -413,7 +413,7 @@ _IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waite
 
 
 def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
-    """All messages as they went onto the network, among the facts that rules are judged by.
+    """Yield all messages as they went onto the network, among the facts that rules are judged by.
 
     Of a camera's frame, what it stands for. What happens at the same moment stays in its order.
     """
@@ -430,7 +430,7 @@ def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
-    """A message as it went onto the network; of a frame, what it stands for."""
+    """Return a message as it went onto the network; of a frame, what it stands for."""
     if isinstance(sent.payload, CameraFrame):
         frame = sent.payload
         seen = frame.observation
@@ -456,7 +456,7 @@ def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
 
 
 def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[ChannelMessage]:
-    """The traces of those who decide, line by line, by name."""
+    """Yield the traces of those who decide, line by line, by name."""
     for name, lines in traces.items():
         for time, line in lines:
             content = {"timestamp": messages.stamp(time), "line": line}
@@ -464,14 +464,14 @@ def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[Chann
 
 
 def audited(rows: Sequence[tuple[float, Mapping[str, Any]]]) -> Iterator[ChannelMessage]:
-    """The rows of an audit log, with their hashes."""
+    """Yield the rows of an audit log, with their hashes."""
     for time, row in rows:
         content = {"timestamp": messages.stamp(time), "row": json.dumps(row)}
         yield ChannelMessage(time, AUDIT, "dva_sim.Audited", content)
 
 
 def names_of(labels: Mapping[str, str]) -> dict[str, str]:
-    """A name for each id that fits into a topic, and that no other id has."""
+    """Return a name for each id that fits into a topic, and that no other id has."""
     names: dict[str, str] = {}
     for device, label in labels.items():
         name = label.replace(" ", "-").replace("/", "-")
@@ -481,7 +481,7 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
 
 
 def shown(playback: Playback) -> Iterator[ChannelMessage]:
-    """The frames that come onto the operators' screens."""
+    """Yield the frames that come onto the operators' screens."""
     labels = playback.labels
     names = names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
@@ -494,7 +494,7 @@ def shown(playback: Playback) -> Iterator[ChannelMessage]:
 def frame_shown(
     time: float, topic: str, drive: int, robot: str, *, captured: float
 ) -> ChannelMessage:
-    """A frame comes onto an operator's screen."""
+    """Return a frame that comes onto an operator's screen."""
     values = {"drive": drive, "robot": robot, "captured_s": captured}
     return stamped(time, topic, "dva_sim.Shown", **values)
 
@@ -560,7 +560,7 @@ def latency(time: float, robot: str, what: str, *, delay: float) -> ChannelMessa
 
 
 def picture(time: float, name: str, jpeg: bytes) -> ChannelMessage:
-    """A picture of a robot's camera."""
+    """Return a picture of a robot's camera."""
     data = base64.b64encode(jpeg).decode()
     schema = "foxglove.CompressedImage"
     return stamped(time, f"/{name}/{IMAGE}", schema, frame_id=name, format="jpeg", data=data)

@@ -37,7 +37,7 @@ def statuses_at(
 
 
 def _event_at(event: Event, now: float) -> Event | None:
-    """An event as it stood at a moment; None if it was not known yet."""
+    """Return an event as it stood at a moment; None if it was not known yet."""
     times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
     if "detected" not in times:
         return None

@@ -41,7 +41,7 @@ class ChannelMessage(NamedTuple):
 
 
 def stamped(time: float, topic: str, schema: str, **content: Any) -> ChannelMessage:
-    """A message that begins with its time [s]."""
+    """Return a message that begins with its time [s]."""
     return ChannelMessage(time, topic, schema, {"timestamp": stamp(time), **content})
 
 
@@ -51,25 +51,25 @@ def nanoseconds(time: float) -> int:
 
 
 def stamp(time: float) -> dict[str, int]:
-    """A moment [s] as messages hold it."""
+    """Return a moment [s] as messages hold it."""
     sec, nsec = divmod(nanoseconds(time), NS)
     return {"sec": sec, "nsec": nsec}
 
 
 def point(x: float, y: float, z: float = 0.0) -> dict[str, float]:
-    """A point or vector [m]."""
+    """Return a point or vector [m]."""
     return {"x": round(x, PLACES), "y": round(y, PLACES), "z": round(z, PLACES)}
 
 
 def turned(heading: float) -> dict[str, float]:
-    """A turn about the vertical [rad], as a quaternion."""
+    """Return a turn about the vertical [rad], as a quaternion."""
     z = round(math.sin(heading / 2), TURNS)
     w = round(math.cos(heading / 2), TURNS)
     return {"x": 0.0, "y": 0.0, "z": z, "w": w}
 
 
 def heading_of(rotation: dict[str, float]) -> float:
-    """The turn about the vertical [rad] that a quaternion stands for."""
+    """Return the turn about the vertical [rad] that a quaternion stands for."""
     return 2.0 * math.atan2(rotation["z"], rotation["w"])
 
 
@@ -82,13 +82,13 @@ HERE = pose(0.0, 0.0)
 
 
 def colour(code: str, opacity: float = 1.0) -> dict[str, float]:
-    """A colour such as `#2f7fd0`."""
+    """Return a colour such as `#2f7fd0`."""
     r, g, b = (round(int(code[start : start + 2], 16) / 255, 3) for start in (1, 3, 5))
     return {"r": r, "g": g, "b": b, "a": opacity}
 
 
 def finite(value: float) -> float | None:
-    """A number as JSON has it: what never comes is null."""
+    """Return a number as JSON has it: what never comes is null."""
     return value if math.isfinite(value) else None
 
 

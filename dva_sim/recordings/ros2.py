@@ -96,7 +96,7 @@ def _velocity(before: TrackPoint, after: TrackPoint) -> tuple[float, float, floa
 
 
 def _ros_name(name: str) -> str:
-    """A name as ROS allows it."""
+    """Return a name as ROS allows it."""
     return "".join(letter if letter.isalnum() else "_" for letter in name)
 
 
@@ -107,24 +107,24 @@ class _Maker:
         self._types = types
 
     def pose(self, p: TrackPoint) -> Any:
-        """geometry_msgs/PoseStamped."""
+        """Return geometry_msgs/PoseStamped."""
         return self._new("geometry_msgs/msg/PoseStamped", self._header(p.time), self._pose(p))
 
     def transform(self, name: str, p: TrackPoint) -> Any:
-        """tf2_msgs/TFMessage with one transform."""
+        """Return tf2_msgs/TFMessage with one transform."""
         turn = self._pose(p).orientation
         there = self._new("geometry_msgs/msg/Transform", self._vector(p.x, p.y), turn)
         stamped = self._new("geometry_msgs/msg/TransformStamped", self._header(p.time), name, there)
         return self._new("tf2_msgs/msg/TFMessage", [stamped])
 
     def twist(self, time: float, name: str, ahead: float, left: float, turn: float) -> Any:
-        """geometry_msgs/TwistStamped."""
+        """Return geometry_msgs/TwistStamped."""
         angular = self._new("geometry_msgs/msg/Vector3", 0.0, 0.0, turn)
         twist = self._new("geometry_msgs/msg/Twist", self._vector(ahead, left), angular)
         return self._new("geometry_msgs/msg/TwistStamped", self._header(time, name), twist)
 
     def grid(self, grid: OccupancyGrid) -> Any:
-        """nav_msgs/OccupancyGrid: 0 free, 100 occupied, -1 unknown."""
+        """Return nav_msgs/OccupancyGrid: 0 free, 100 occupied, -1 unknown."""
         rows, columns = grid.cells.shape
         origin = self._pose(TrackPoint(0.0, *grid.origin, ""))
         data = self._time(0.0), grid.resolution, columns, rows, origin
@@ -133,7 +133,7 @@ class _Maker:
         return self._new("nav_msgs/msg/OccupancyGrid", self._header(0.0), info, cells.ravel())
 
     def log(self, moment: Moment) -> Any:
-        """rcl_interfaces/Log."""
+        """Return rcl_interfaces/Log."""
         level = LEVELS.get(moment.kind, INFO)
         stamp = self._time(moment.time)
         return self._new("rcl_interfaces/msg/Log", stamp, level, moment.who, moment.what, "", "", 0)

@@ -52,7 +52,7 @@ def pack(site: Site) -> dict[str, bytes]:
 
 
 def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
-    """The site, even if its own files have changed since.
+    """Return the site, even if its own files have changed since.
 
     Args:
         files: From `pack`.
@@ -76,7 +76,7 @@ def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
 
 
 def _map_files(site: Site) -> dict[str, bytes]:
-    """A bare map in ROS map_server form, each cell as it was read."""
+    """Return a bare map in ROS map_server form, each cell as it was read."""
     from PIL import Image
 
     grid = site.grid
@@ -204,7 +204,7 @@ def _beside(path: Path) -> Path:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file beside `path`, which takes its place if all goes well, and else is gone.
+    """Yield a file beside `path`, which takes its place if all goes well, and else is gone.
 
     Raises:
         DvaSimError: it cannot be written.
@@ -223,7 +223,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def every_message(playback: Playback) -> Iterator[ChannelMessage]:
-    """All messages of a recording, grouped by what they tell, not by time."""
+    """Yield all messages of a recording, grouped by what they tell, not by time."""
     yield from channels.ground(playback)
     yield from channels.activities(playback)
     yield from channels.bodies(playback)
@@ -280,7 +280,7 @@ def schema_of_channel(name: str) -> tuple[str, str, bytes]:
 def _add_messages(
     writer: Any, playback: Playback, files: Mapping[str, bytes], decided: Sequence[ChannelMessage]
 ) -> None:
-    """All messages in order of time; schemas and channels are opened when first used."""
+    """Add all messages in order of time; schemas and channels are opened when first used."""
     ids = {name: device for device, name in channels.names_of(playback.labels).items()}
     counts: Counter[str] = Counter()
 
@@ -355,7 +355,7 @@ def _held_to(playback: Playback) -> dict[str, Any]:
 
 
 def _event(event: Event) -> dict[str, Any]:
-    """An event as the DVA knew it in the end; the times say how it stood before."""
+    """Return an event as the DVA knew it in the end; the times say how it stood before."""
     return {
         "number": event.number,
         "kind": event.kind,
@@ -395,7 +395,7 @@ def _about(playback: Playback) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    """Tables as JSON has them: what is missing or never came is null."""
+    """Return tables as JSON has them: what is missing or never came is null."""
     if isinstance(value, Mapping):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

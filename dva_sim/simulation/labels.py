@@ -84,7 +84,7 @@ def _measures() -> dict[str, Measure]:
 
 
 def stated_conditions(models: Iterable[str]) -> dict[str, str]:
-    """Keys that a table of conditions may state, with their words there, of some models."""
+    """Return keys that a table of conditions may state, with their words there, of some models."""
     there = (titled_keys(MODELS[name].scenario) for name in models if name in MODELS)
     return {path: key.condition for entry in there for path, key in entry.items() if key.condition}
 
@@ -93,7 +93,7 @@ _OWN_COLUMNS: dict[str, Measure] = {}
 
 
 def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
-    """From now on call the measures of users as a results folder does; the newest one counts.
+    """Call the measures of users as a results folder does; the newest one counts.
 
     Args:
         columns: User-defined columns from the manifest, by table and name.
@@ -115,32 +115,32 @@ def measure_called(name: str, model: str = "") -> Measure:
 
 
 def factor_name(factor: str) -> str:
-    """`link.delay_s` is the one-way delay."""
+    """Return the one-way delay, for `link.delay_s`."""
     key = _keys().get(factor)
     habit = factor.partition(".habits.")[2]
     return key.title if key else _OF_STUDIES.get(factor, without_unit(habit or factor))
 
 
 def with_unit(factor: str) -> str:
-    """A factor's name with its unit in brackets, for the head of a column."""
+    """Return a factor's name with its unit in brackets, for the head of a column."""
     unit = unit_of(factor)
     return f"{factor_name(factor)} [{unit}]" if unit else factor_name(factor)
 
 
 def measure_name(measure: str) -> str:
-    """`drive_time_s` is the driving time to confirmation."""
+    """Return the driving time to confirmation, for `drive_time_s`."""
     return measure_called(measure).words
 
 
 def measure_of(measure: str, part: str) -> str:
-    """A measure in the part of the study that it was taken in."""
+    """Return a measure in the part of the study that it was taken in."""
     return f"{measure_name(measure)} of part {part}"
 
 
 def level_name(
     factor: str, level: Scalar | Mapping[str, Any] | list[Any], short: bool = False
 ) -> str:
-    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
+    """Return one level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
 
     The value that a treatment sets may be a law, or another group of keys:
     `law gamma, mean_s 50 ms`; or several: `from_s 7 s, for_s 2 s; from_s 20 s, for_s 1 s`.
@@ -168,7 +168,7 @@ def is_in_file(level: Scalar) -> bool:
 
 
 def brief(levels: Mapping[str, Scalar]) -> str:
-    """Scalars in a row, without the names of factors that go without saying.
+    """Return scalars in a row, without the names of factors that go without saying.
 
     Words speak for themselves, as do quantities whose unit no other factor here has:
     `250 ms, latest-wins`.
@@ -194,7 +194,7 @@ def setting(levels: Mapping[str, Scalar]) -> str:
 
 
 def named(factor: str, level: Scalar) -> str:
-    """A level behind its factor's name, unless its own has that: `direct control`."""
+    """Return a level behind its factor's name, unless its own has that: `direct control`."""
     name = factor_name(factor)
     own = level_name(factor, level)
     return own if name in own.split() else f"{name} {own}"

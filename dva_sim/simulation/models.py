@@ -109,7 +109,7 @@ class Model(Generic[S]):
         """
 
     def lacks(self, scenario: S) -> str:
-        """One line that says what a run needs and this machine lacks; empty if nothing."""
+        """Return one line that says what a run needs and this machine lacks; empty if nothing."""
         return ""
 
     def contradictions(self, scenario: S) -> list[str]:
@@ -118,7 +118,7 @@ class Model(Generic[S]):
 
     # Persons of a population: names for independent runs where a model has none.
     def set_by_study(self, seed: int) -> dict[str, Any]:
-        """Keys that the study itself sets."""
+        """Return keys that the study itself sets."""
         return {}
 
     def team(self, scenario: S) -> int:
@@ -126,7 +126,7 @@ class Model(Generic[S]):
         return 1
 
     def played_by(self, scenario: S, person: int) -> S:
-        """The scenario with a certain person, by index in the population."""
+        """Return the scenario with a certain person, by index in the population."""
         return scenario
 
 
@@ -271,6 +271,6 @@ def model_for(scenario: AnyScenario) -> Model[Any]:
 
 
 def measured_names() -> set[str]:
-    """Every column of every table of our models."""
+    """Return every column of every table of our models."""
     return {column.name for model in MODELS.values() for columns in model.columns.values()
             for column in columns}  # fmt: skip

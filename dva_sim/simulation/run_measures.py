@@ -34,7 +34,7 @@ class RunMeasure:
     models: tuple[str, ...] = ("full",)
 
     def of(self, recording: Any) -> float | None:
-        """The number, finite and within its bounds; None where the run has none.
+        """Return the number, finite and within its bounds; None where the run has none.
 
         The recording is left as it is: other measures read it, too.
         """
@@ -94,7 +94,7 @@ PLUGINS: Final = Plugins[RunMeasure](
 
 
 def load_measure(name: str, base: Path | None = None) -> RunMeasure:
-    """A measure by name: `mine.py:Mine`, or what an installed package calls it.
+    """Return a measure by name: `mine.py:Mine`, or what an installed package calls it.
 
     Args:
         name: The measure.
@@ -109,7 +109,7 @@ def load_measure(name: str, base: Path | None = None) -> RunMeasure:
 
 @read_once(lambda name: [Path(file_in(name))])
 def _loaded(name: str) -> RunMeasure:
-    """One object for each state of a file; it keeps nothing from run to run."""
+    """Return one object for each state of a file; it keeps nothing from run to run."""
     made = PLUGINS.make(name, PLUGINS.find(name), {})
     about = getattr(made, "about", None)
     if not isinstance(about, Measure):
@@ -149,7 +149,7 @@ def reads(measure: RunMeasure, model: str) -> bool:
 
 
 def refuse_twins(measures: Iterable[RunMeasure], taken: Iterable[str]) -> None:
-    """Two columns of one name would be one.
+    """Refuse two columns of one name, which would be one.
 
     Raises:
         ConfigError: a measure is called as another column is.

@@ -305,7 +305,7 @@ class AnswerWatch:
                 self._breach(each.node, "has neither answered nor counted a request")
 
     def _refused(self) -> int:
-        """Number of refusals, which the recorder counts under names of their own."""
+        """Return the number of refusals, which the recorder counts under names of their own."""
         counters = self._recorder.counters
         return sum(count for name, count in counters.items() if name.startswith("refused"))
 

@@ -63,7 +63,7 @@ class FaultKind:
 
 
 def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Begin:
-    """A rule for the messages between some nodes."""
+    """Return a rule for the messages between some nodes."""
 
     def begin(storm: StormScene, fault: Fault, chance: random.Random) -> End:
         source = storm.id_of(fault.source)
@@ -87,7 +87,7 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
 
 
 def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """A process that is stopped: what comes and goes waits, and is there all at once."""
+    """Return a process that is stopped: what comes and goes waits, and is there all at once."""
     node = storm.id_of(fault.target)
     held = list[i.PassingMessage]()
     interference = storm.interference
@@ -109,7 +109,7 @@ def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Some of the last messages reach a node again, at once or within some seconds."""
+    """Replay some of the last messages to a node, at once or within some seconds."""
     past = storm.interference.past(storm.id_of(fault.target))
     after = chance.choice((0.0, chance.uniform(0.0, 5.0)))
     for passing in chance.sample(past, min(len(past), max(1, round(fault.value)))):
@@ -117,7 +117,7 @@ def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An order to a robot arrives again when what it began is over: a copy that was long away.
+    """Let a copy of an order arrive again when what it began is over.
 
     Meanwhile an intruder asks in the name of its sender, until the robot has forgotten its reply.
     """
@@ -139,7 +139,7 @@ FORGOTTEN_AFTER: Final = 80  # requests, of which a robot remembers 64
 
 
 def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An intruder sends some of the last messages again, over a connection of its own."""
+    """Replay some of the last messages from an intruder, over its own connection."""
     to = storm.id_of(fault.target)
     past = storm.interference.past(to)
     for passing in chance.sample(past, min(len(past), max(1, round(fault.value)))):
@@ -163,7 +163,7 @@ _JUNK: Final[tuple[Callable[[str, random.Random], bytes], ...]] = (
 
 
 def _set_to(to: str, speed: str) -> bytes:
-    """A command whose speed is something else."""
+    """Return a command whose speed is something else."""
     message = m.Message(to, 1, to, "12:00:00", 1, m.SetTeleOp(0.25, 0.0))
     return encode(message).replace(b"0.25", speed.encode())
 
@@ -234,7 +234,7 @@ def _blind(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _lie(storm: StormScene, fault: Fault, chance: random.Random) -> End | None:
-    """A sensor that says anything."""
+    """Return a sensor that says anything."""
     sensors = storm.robot(fault.target).agent.sensors
     if not sensors:
         return None
@@ -260,7 +260,7 @@ def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Somebody takes the robot at the robot itself, as soon as it lets them, and drives about.
+    """Take the robot by hand, as soon as it lets somebody, and drive about.
 
     It tries again and again, also while others drive the robot. Now and then the hand
     rests, or lets go and takes it again at once.
@@ -363,7 +363,7 @@ def _vanish(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _idle(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """A guard answers every order with OK, and does nothing."""
+    """Return a guard answers every order with OK, and does nothing."""
     node = storm.id_of(fault.target)
     network = storm.device(fault.target).network
     assert isinstance(network, VirtualNetwork)
@@ -378,7 +378,7 @@ def _restart_app(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 
 def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Somebody sends one, in whatever name, to whomever it is addressed, in any session."""
+    """Send an emergency in whatever name, to whomever it is addressed, in any session."""
     robot = storm.id_of(fault.target)
     if chance.random() < 0.4:
         storm.intruder.ask(robot, m.Emergency())
@@ -402,7 +402,7 @@ def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Somebody else is given the robot, unasked, starts at once, and gives it back later."""
+    """Give the robot to somebody else, unasked, who starts at once, and gives it back later."""
     robot = storm.id_of(fault.target)
     dva = storm.run.dva
     if dva.is_gone:  # nobody is given anything by the dead
@@ -426,7 +426,7 @@ def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An operator asks for a robot in the midst of whatever it does, more than once.
+    """Ask for a robot in the midst of whatever it does, more than once.
 
     It gives back every permission that it gets, even one that it drives by.
     """
@@ -444,7 +444,7 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An operator acts by sessions of before, or that never were."""
+    """Act by sessions of before, or that never were, as an operator."""
     device = storm.device(fault.target)
     robot = chance.choice(storm.robots)
     bodies: list[m.Body] = [m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp()]
@@ -456,12 +456,12 @@ def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 
 def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """An intruder that is registered asks for the robot, and drives it as soon as it may."""
+    """Return an intruder that is registered asks for the robot, and drives it as soon as it may."""
     return storm.intruder.drive(storm.id_of(fault.target), fault.value)
 
 
 def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """An intruder sends so many requests a second: of all kinds, or of one."""
+    """Send so many requests a second as an intruder: of all kinds, or of one."""
     to = storm.id_of(fault.target)
     goes = [True]
     clock = storm.run.clock
@@ -503,7 +503,7 @@ def _flood_in_doubt(storm: StormScene, fault: Fault, chance: random.Random) -> E
 
 
 def _report(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Events are reported that may be anywhere: in a wall, outside, at one place."""
+    """Report events that may be anywhere: in a wall, outside, at one place."""
     kind = chance.choice(("fire", "gas_leak", "flood"))
     for _ in range(max(1, round(fault.value))):
         storm.intruder.report(kind, storm.anywhere(chance))
@@ -517,7 +517,7 @@ def _report_twice(storm: StormScene, fault: Fault, chance: random.Random) -> Non
 
 
 def _take_back(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An event is reported, and taken back a little later by who has reported it."""
+    """Report an event, and take it back a little later."""
     place = storm.anywhere(chance)
     hand = storm.intruder
     hand.report("flood", place)

@@ -56,13 +56,13 @@ class Contacts:
         self.last = -math.inf
 
     def begin(self, now: float) -> None:
-        """It touches one more shape."""
+        """Begin to touch one more shape."""
         if not self.touching and now - self.last > SAME_CONTACT:
             self.count += 1
         self.touching += 1
 
     def end(self, now: float) -> None:
-        """It touches one shape less."""
+        """Touch one shape less."""
         self.touching -= 1
         self.last = now
 
@@ -80,7 +80,7 @@ class Jam:
         self._x = self._y = self._heading = math.inf
 
     def strain(self, x: float, y: float, heading: float, dt: float) -> None:
-        """For a tick it was asked to move while it touched something, there [m, rad]."""
+        """Note that a body was asked to move for a tick while it touched something [m, rad]."""
         if not self._near(x, y, heading):
             self._x = x
             self._y = y
@@ -136,7 +136,7 @@ class AskedFor(Generic[T]):
         self.coming: deque[tuple[int, T]] = deque()
 
     def put(self, start: int, what: T) -> None:
-        """From tick `start` on; starts never go back."""
+        """Put a motion from tick `start` on; starts never go back."""
         if self.coming and self.coming[-1][0] == start:
             self.coming.pop()
         self.coming.append((start, what))
@@ -179,11 +179,11 @@ class Ticks:
         self._awake[body] = None
 
     def forget(self, body: Body) -> None:
-        """A body is not pushed any more."""
+        """Forget a body that is not pushed any more."""
         self._awake.pop(body, None)
 
     def tick_at(self, time: float) -> float:
-        """The first tick that begins at `time` [s] or later."""
+        """Return the first tick that begins at `time` [s] or later."""
         time = time if time > 0.0 else 0.0
         return math.inf if time == math.inf else -(round(-time * US) // self._tick_us)
 
@@ -193,7 +193,7 @@ class Ticks:
         return self._tick * self.dt
 
     def next_tick(self) -> int:
-        """The first tick that a set point given now can reach."""
+        """Return the first tick that a set point given now can reach."""
         due = -(-self._now_us // self._tick_us)
         return due if due > self._tick else self._tick
 
@@ -282,17 +282,17 @@ class Body:
         raise NotImplementedError
 
     def meets(self, other: Body | None, now: float) -> None:
-        """It begins to touch somebody, or a wall (None)."""
+        """Note that it begins to touch somebody, or a wall (None)."""
         for contacts in self.counts(other):
             contacts.begin(now)
 
     def parts(self, other: Body | None, now: float) -> None:
-        """It touches somebody, or a wall (None), no longer."""
+        """Note that it touches somebody, or a wall (None), no longer."""
         for contacts in self.counts(other):
             contacts.end(now)
 
     def feels(self, other: Body | None, impulse: float) -> None:
-        """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
+        """Note that a contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
         self._world.wake(self)
         if self.counts(other):
             self.impulse += impulse
@@ -557,6 +557,6 @@ class RobotBody(Body):
         return self._lock.closed
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
-        """All; those with people by themselves, too."""
+        """Return all; those with people by themselves, too."""
         person = other is not None and other.kind == PERSON
         return (self._touch, self._people) if person else (self._touch,)

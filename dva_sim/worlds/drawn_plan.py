@@ -84,7 +84,7 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> tuple[Fl
 
 
 def _numbered(kinds: dict[str, list[Feature]], kind: str) -> list[tuple[Feature, str]]:
-    """The features of a kind, each with its name; the nameless are numbered."""
+    """Return the features of a kind, each with its name; the nameless are numbered."""
     what = kind.replace("_", "-")
     return [(f, f.drawn.name or f"{what}-{n}") for n, f in enumerate(kinds[kind], 1)]
 
@@ -98,7 +98,7 @@ def _holes(feature: Feature) -> tuple[Points, ...]:
 
 
 def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
-    """Rooms need names of their own; paths and yards may go without."""
+    """Return rooms need names of their own; paths and yards may go without."""
     rooms: list[Room] = []
     for kind in GROUND:
         for number, feature in enumerate(kinds[kind], 1):
@@ -124,7 +124,7 @@ def _camera(feature: Feature, name: str) -> FixedCamera:
 
 
 def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
-    """In the order of the file, numbered by kind."""
+    """Return detectors in the order of the file, numbered by kind."""
     found: list[Detector] = []
     for feature in features:
         sensor = feature.kind.removesuffix("_detector")
@@ -135,7 +135,7 @@ def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
 
 
 def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
-    """Out is the side further out: rooms, ground outdoors, nothing drawn; if alike, the left."""
+    """Return the exit; out is the side further out: rooms, outdoors, nothing drawn, or left."""
     x1, y1, x2, y2 = _ends(feature.shape)
     width = math.hypot(x2 - x1, y2 - y1)
     if width < LEAST_EXIT:
@@ -149,7 +149,7 @@ def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
 
 
 def _ends(line: Any) -> list[float]:
-    """The first and the last point of a line: x1, y1, x2, y2 [m]."""
+    """Return the first and the last point of a line: x1, y1, x2, y2 [m]."""
     return [float(value) for value in np.ravel(line.coords)[[0, 1, -2, -1]]]
 
 
@@ -165,7 +165,7 @@ def _open_walls(
     exits: tuple[Exit, ...],
     lookup: Lookup[Room],
 ) -> tuple[Points, tuple[Points, ...], Any]:
-    """Walls opened at the doors `(n, 4)` [m], corners of solids, and the floor.
+    """Return walls opened at the doors `(n, 4)` [m], corners of solids, and the floor.
 
     An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.
     """
@@ -202,7 +202,7 @@ def _rims(rooms: tuple[Room, ...], drawn: Any) -> Iterator[Any]:
 
 
 def _sides(solid: Any) -> Points:
-    """The sides `(n, 4)` [m] of a solid, cut where its pieces without holes are."""
+    """Return the sides `(n, 4)` [m] of a solid, cut where its pieces without holes are."""
     sides = np.vstack([segments(piece) for piece in _without_holes(solid)])
     known = [side(each[:2], each[2:]) for each in sides]
     times = Counter(known)  # two pieces share a cut, which is no side of the solid
@@ -210,7 +210,7 @@ def _sides(solid: Any) -> Points:
 
 
 def _without_holes(area: Any) -> Iterator[Any]:
-    """An area cut into pieces that have none."""
+    """Yield an area cut into pieces that have none."""
     if not area.interiors:
         yield area
         return

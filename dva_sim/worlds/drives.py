@@ -73,7 +73,7 @@ class Differential(Drive):
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """First order towards what is wanted, within the limits of acceleration."""
+        """Return the first order towards what is wanted, within the limits of acceleration."""
         gain = 1.0 / (self._time if self._time > dt else dt)
         along = (speed - now_speed) * gain
         turn = (turn_rate - now_turn_rate) * gain
@@ -126,7 +126,7 @@ class ThreeWay(Drive):
         self._motor = Differential(spec)
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
-        """The nearest duty and the nearest of three positions."""
+        """Return the nearest duty and the nearest of three positions."""
         speed = round(100.0 * speed / self.spec.max_speed) * self.spec.max_speed / 100.0
         if abs(turn_rate) < 0.5 * self._most * speed or speed == 0.0:
             return speed, 0.0
@@ -248,7 +248,7 @@ class DriveSpec:
         )
 
     def safe_speed(self, dt: float) -> float:
-        """Up to which a tick of `dt` [s] is short enough that nothing thin is passed [m/s]."""
+        """Return the speed up to which a tick of `dt` [s] passes nothing thin [m/s]."""
         return 0.5 * self.inner_radius / dt
 
     @property

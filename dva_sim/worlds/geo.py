@@ -69,7 +69,7 @@ class GeoFrame:
         return _A * math.sqrt(max(0.0, 2 - 2 * cosine))
 
     def to_xy(self, latitude: float, longitude: float) -> tuple[float, float]:
-        """Plane coordinates [m] of a geographic position [deg]."""
+        """Return the plane coordinates [m] of a geographic position [deg]."""
         sin_0, cos_0, normal_0 = self._origin
         phi = math.radians(latitude)
         along = math.radians(longitude) - math.radians(self.longitude)
@@ -81,7 +81,7 @@ class GeoFrame:
         return normal * cos * math.sin(along), cos_0 * up - sin_0 * (out - normal_0 * cos_0)
 
     def to_latlon(self, x: float, y: float) -> tuple[float, float]:
-        """Latitude and longitude [deg] of a point of the plane [m].
+        """Return the latitude and longitude [deg] of a point of the plane [m].
 
         Inverts `to_xy` by fixed-point steps; each gains about three digits within 3 km.
         """

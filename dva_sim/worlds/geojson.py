@@ -277,7 +277,7 @@ def _crs(collection: Mapping[str, Any]) -> str:
 
 
 def _error(path: Path, text: str, index: int, problem: str) -> ConfigError:
-    """The mistake in a feature; only now is its line and column looked for."""
+    """Return the mistake in a feature; only now is its line and column looked for."""
     at = _place(text, index)
     line = text.count("\n", 0, at) + 1
     column = at - text.rfind("\n", 0, at)
@@ -327,7 +327,7 @@ def _parts(data: Any, frame: GeoFrame, crs: str, fail: Fail) -> Iterator[Feature
 
 
 def _in_metres(geometry: dict[str, Any], frame: GeoFrame, crs: str, fail: Fail) -> Any:
-    """A geometry in the plane of the site, once its positions are known to lie there."""
+    """Return a geometry in the plane of the site, once its positions are known to lie there."""
     try:
         drawn: Any = shape(geometry)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, GEOSException):
@@ -354,7 +354,7 @@ def _of_system(crs: str) -> str:
 
 
 def _far(longitude: float, latitude: float, frame: GeoFrame) -> str:
-    """A position that lies far from the origin, and what may be the cause."""
+    """Return a position that lies far from the origin, and what may be the cause."""
     away = frame.distance(latitude, longitude) / 1e3
     origin = f"{frame.latitude:g}, {frame.longitude:g}"
     text = f"position {longitude:g}, {latitude:g} lies {away:,.0f} km from the site's origin"
@@ -364,7 +364,7 @@ def _far(longitude: float, latitude: float, frame: GeoFrame) -> str:
 
 
 def _to_xy(points: Points, frame: GeoFrame) -> Points:
-    """Metres from longitude, latitude; to the millimetre, which is what nine digits hold."""
+    """Return metres from longitude, latitude; to the millimetre, which is what nine digits hold."""
     return (
         np.array([frame.to_xy(latitude, longitude) for longitude, latitude in points]).round(3)
         + 0.0
@@ -373,7 +373,7 @@ def _to_xy(points: Points, frame: GeoFrame) -> Points:
 
 # --- writing ---------------------------------------------------------------------------
 def write_features(path: Path, features: Iterable[Feature], frame: GeoFrame) -> None:
-    """A GeoJSON file that `read_features` reads, one feature a line."""
+    """Write a GeoJSON file that `read_features` reads, one feature a line."""
     lines = []
     for feature in features:
         there = shapely.transform(feature.shape, lambda points: _to_degrees(points, frame))
@@ -389,6 +389,6 @@ def write_features(path: Path, features: Iterable[Feature], frame: GeoFrame) -> 
 
 
 def _to_degrees(points: Points, frame: GeoFrame) -> Points:
-    """Longitude, latitude from metres."""
+    """Return the longitude, latitude from metres."""
     degrees = np.array([frame.to_latlon(x, y) for x, y in points.tolist()])
     return degrees[:, ::-1].round(DIGITS)

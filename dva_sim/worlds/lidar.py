@@ -46,7 +46,7 @@ class Lidar:
         self._seen_at = -math.inf
 
     def scan(self, bodies: Sequence[RobotBody]) -> Floats:
-        """Distances from the middle of each body, rays counter-clockwise.
+        """Return distances from the middle of each body, rays counter-clockwise.
 
         Returns:
             Shape `(n, rays)` [m]; `reach` where nothing is met.
@@ -65,7 +65,7 @@ class Lidar:
         return best.reshape(len(bodies), self.rays)
 
     def read(self, body: RobotBody) -> Floats:
-        """A scan of one body, shape `(rays,)` [m]: the same as `scan` gives, but cheaper.
+        """Return a scan of one body, shape `(rays,)` [m]: the same as `scan` gives, but cheaper.
 
         Those who listen are scanned along with the first of them that asks in a tick.
         """
@@ -91,7 +91,7 @@ class Lidar:
         return by, self._walls[np.concatenate([np.empty(0, np.int64), *near])]
 
     def _walls_about(self, column: int, row: int) -> Ints:
-        """Walls in reach of somewhere in a cell, kept for the next time."""
+        """Return walls in reach of somewhere in a cell, kept for the next time."""
         key = column, row
         if key not in self._near:
             middle = CELL * (np.array(key) + 0.5)
@@ -113,7 +113,7 @@ class Lidar:
     # --- cutting rays with it ----------------------------------------------------------
 
     def _rays_between(self, low: Floats, span: Floats) -> tuple[Ints, Ints]:
-        """Rays within each of some angles, from `low` counter-clockwise [rad].
+        """Return rays within each of some angles, from `low` counter-clockwise [rad].
 
         Returns:
             Which angle, and which ray, one row for each that may fall into it.
@@ -192,7 +192,7 @@ def _corners(body: Body) -> tuple[tuple[float, float], ...]:
 
 
 def _edges(others: Sequence[Body], seen: Ints, by: Ints) -> tuple[Ints, Floats]:
-    """The sides of bodies with corners, for each eye that may see them."""
+    """Return the sides of bodies with corners, for each eye that may see them."""
     sides = {int(number): _sides(others[number]) for number in np.unique(seen)}
     near = [sides[number] for number in seen.tolist()]
     whose = np.repeat(by, [len(ends) for ends in near])

@@ -65,7 +65,7 @@ class Sight:
 
 
 def _side(p: Any, q: Any, point: Any) -> Any:
-    """On which side of the line p-q a point lies, by sign."""
+    """Return on which side of the line p-q a point lies, by sign."""
     px, py = p
     qx, qy = q
     x, y = point

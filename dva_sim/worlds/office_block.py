@@ -83,7 +83,7 @@ class FloorCell(NamedTuple):
         return 1.0 if self.door_north else -1.0
 
     def box(self, left: float, right: float, near: float, far: float) -> Box:
-        """A rectangle in it, by its gaps [m] to the sides, to the corridor and opposite."""
+        """Return a rectangle in it, by its gaps [m] to the sides, to the corridor and opposite."""
         south, north = (far, near) if self.door_north else (near, far)
         ends = self.x1 + left, self.y1 + south, self.x2 - right, self.y2 - north
         return tenths(ends[0]), tenths(ends[1]), tenths(ends[2]), tenths(ends[3])
@@ -114,7 +114,7 @@ class Layout:
 
 
 def tenths(value: float) -> float:
-    """Walls lie on a lattice of 0.1 m."""
+    """Return walls lie on a lattice of 0.1 m."""
     return round(float(value), 1)
 
 
@@ -173,7 +173,7 @@ def _cells(
     lobby: Box,
     rng: np.random.Generator,
 ) -> Iterator[FloorCell]:
-    """Rooms south and north of each corridor, from west to east."""
+    """Yield rooms south and north of each corridor, from west to east."""
     last = len(corridors) - 1
     across = [(pieces[0][0], pieces[0][2]) for pieces in crossings]
     for wing, (_, low, width, high) in enumerate(corridors):
@@ -229,13 +229,13 @@ def _nothing(_: FloorCell) -> Iterator[Box]:
 
 
 def _desk(cell: FloorCell) -> Iterator[Box]:
-    """One desk or two at the window."""
+    """Yield one desk or two at the window."""
     side = tenths((cell.width - min(cell.width - 1.2, 3.2)) / 2)
     yield cell.box(side, side, cell.depth - 0.8, 0.0)
 
 
 def _table(cell: FloorCell) -> Iterator[Box]:
-    """Something large in the middle that one can walk around."""
+    """Yield something large in the middle that one can walk around."""
     if cell.width >= 3.4 and cell.depth >= 3.4:
         yield cell.box(1.2, 1.2, 1.2, 1.2)
 
@@ -249,12 +249,12 @@ def _cubicles(cell: FloorCell) -> Iterator[Box]:
 
 
 def _flight(cell: FloorCell) -> Iterator[Box]:
-    """A flight of stairs along one side; past it lies the way out."""
+    """Yield a flight of stairs along one side; past it lies the way out."""
     yield cell.box(0.0, cell.width - 1.3, 1.6, 0.9)
 
 
 def _rows(size: float, aisle: float) -> Callable[[FloorCell], Iterator[Box]]:
-    """Rows away from the door: benches, racks, shelves, islands of desks."""
+    """Return rows away from the door: benches, racks, shelves, islands of desks."""
 
     def rows(cell: FloorCell) -> Iterator[Box]:
         count = int((cell.width - aisle) / (size + aisle))
@@ -297,7 +297,7 @@ LARGE_FROM = 36.0  # [m^2]
 
 
 def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
-    """A use and a name for every cell, in the order of the cells.
+    """Return a use and a name for every cell, in the order of the cells.
 
     Stairs stand at the facades, as they lead out; robots get the largest rooms near the
     lobby; one of each of `SINGLE` is spread over the house; all others go by their size.
@@ -342,7 +342,7 @@ def _unfit_for_one(x: float, cell: FloorCell) -> float:
 
 
 def _stairwells(layout: Layout) -> Iterator[tuple[bool, float]]:
-    """At which facade, and where along it [m]; the lobby is the southern one of small houses."""
+    """Yield facades and places along them [m]; the lobby is the southern one of small houses."""
     count = max(1, round(layout.width / STAIRS_EVERY))
     for number in range(count):
         yield True, layout.width * (number + 0.5) / count
@@ -351,7 +351,7 @@ def _stairwells(layout: Layout) -> Iterator[tuple[bool, float]]:
 
 
 def _by_size(cell: FloorCell, numbers: Iterator[int]) -> tuple[Use, str]:
-    """Any other room; its number tells the corridor."""
+    """Return any other room; its number tells the corridor."""
     number = next(numbers)
     if cell.area >= LARGE_FROM:
         use = LARGE[number % len(LARGE)]
@@ -401,7 +401,7 @@ class OfficeBlock(Config):
 
 
 def office_block(block: OfficeBlock) -> tuple[Feature, ...]:
-    """The features of a house, in metres; its south-western corner is the origin."""
+    """Return the features of a house, in metres; its south-western corner is the origin."""
     streams = Streams(block.seed)
     layout = lay_out(block.width_m, block.depth_m, streams.fresh("office-block/layout"))
     rooms = assign(layout, block.robot_bases)
@@ -419,7 +419,7 @@ def _feature(kind: str, shape: Any, **properties: Any) -> Feature:
 
 
 def _box(box: Sequence[float]) -> Any:
-    """Corners counter-clockwise from the south-west."""
+    """Return corners counter-clockwise from the south-west."""
     x1, y1, x2, y2 = box
     return Polygon([(x1, y1), (x2, y1), (x2, y2), (x1, y2)])
 
@@ -442,7 +442,7 @@ def _ways(layout: Layout) -> Iterator[Feature]:
 
 
 def _exits(layout: Layout, rooms: Iterable[tuple[FloorCell, Use, str]]) -> Iterator[Feature]:
-    """At both ends of every corridor, in the lobby, and past every flight of stairs."""
+    """Yield exits at both ends of every corridor, in the lobby, and past every flight of stairs."""
     for number, (_, low, width, high) in enumerate(layout.corridors, 1):
         for x, side in ((0.0, "West"), (width, "East")):
             ends = LineString([(x, tenths(low + 0.4)), (x, tenths(high - 0.4))])
@@ -503,7 +503,7 @@ def _people_and_robots(
 
 
 def _posts(layout: Layout) -> list[tuple[float, float, float]]:
-    """The lobby first, then the ends of the corridors: x, y [m], heading [deg]."""
+    """Return the lobby first, then the ends of the corridors: x, y [m], heading [deg]."""
     x1, y1, x2, _ = layout.lobby
     posts = [(x1 + POST_ROOM, y1 + 1.5, 0.0), (x2 - POST_ROOM, y1 + 1.5, 180.0)]
     for _, low, width, high in layout.corridors:
@@ -514,7 +514,7 @@ def _posts(layout: Layout) -> list[tuple[float, float, float]]:
 
 
 def _equipment(layout: Layout) -> Iterator[Feature]:
-    """Smoke detectors, cameras and base stations along the corridors and in the lobby."""
+    """Yield the smoke detectors, cameras and base stations along the corridors and in the lobby."""
     for _, low, width, high in layout.corridors:
         y = (low + high) / 2
         for x in _along(width, DETECTOR_EVERY):
@@ -531,6 +531,6 @@ def _equipment(layout: Layout) -> Iterator[Feature]:
 
 
 def _along(length: float, every: float) -> list[float]:
-    """Places evenly along a corridor [m]."""
+    """Return places evenly along a corridor [m]."""
     count = max(1, round(length / every))
     return [length * (number + 0.5) / count for number in range(count)]

@@ -96,7 +96,7 @@ class PersonBody(Body):
         return True
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
-        """Only those with robots."""
+        """Return only contacts with robots."""
         return (self._touch,) if other is not None and other.kind == ROBOT else ()
 
 
@@ -216,7 +216,7 @@ class World(Ticks):
     # --- contacts ----------------------------------------------------------------------
 
     def _pair(self, arbiter: pymunk.Arbiter) -> tuple[tuple[Body, Body | None], ...]:
-        """Each body of a contact with what it touches: somebody, or a wall (None)."""
+        """Return each body of a contact with what it touches: somebody, or a wall (None)."""
         one, other = (self._by_shape.get(shape) for shape in arbiter.shapes)
         sides = ((one, other), (other, one))
         return tuple((body, partner) for body, partner in sides if body is not None)
@@ -248,7 +248,7 @@ Segment = tuple[float, float, float, float]
 
 
 def hall(width: float, depth: float, walls: Sequence[Segment] = ()) -> Site:
-    """A hall with a corner at 0, 0, and walls in it [m], thin as all walls are."""
+    """Return a hall with a corner at 0, 0, and walls in it [m], thin as all walls are."""
     corners = [(0, 0), (width, 0), (width, depth), (0, depth), (0, 0)]
     border = [(*a, *b) for a, b in itertools.pairwise(corners)]
     lines = np.array([*border, *walls], float)

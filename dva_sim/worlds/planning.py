@@ -54,7 +54,7 @@ class Planner:
         )
 
     def path(self, start: Point, goal: Point, avoid: Sequence[Disc] = ()) -> Floats | None:
-        """A way from `start` to `goal` [m].
+        """Return a way from `start` to `goal` [m].
 
         It keeps the clearance except near ends that are closer to a wall, and runs in the
         middle of doors and corridors.
@@ -77,11 +77,11 @@ class Planner:
         return self._roadmap.room_at(points)
 
     def distance(self, start: Point, goal: Point) -> float:
-        """Length of that way [m]; infinite if there is none."""
+        """Return the length of that way [m]; infinite if there is none."""
         return self._roadmap.length(_plain(start), _plain(goal))
 
     def cost(self, start: Point, goal: Point) -> float:
-        """Length of a way before it is smoothed, a metre near a wall counting more [m].
+        """Return the length of a way before it is smoothed, a metre near a wall counting more [m].
 
         Infinite if there is none. Of many goals of one start it is found at once.
         """
@@ -202,14 +202,14 @@ class Roadmap:
         return self._relax(_resample(self._shorten(points)))
 
     def _field(self, goal: int) -> tuple[Floats, NDArray[np.int32]]:
-        """Cost from every node to `goal`, and each node's next one on the way there."""
+        """Return the cost from every node to `goal`, and each node's next one on the way there."""
         from scipy.sparse.csgraph import dijkstra  # late: start-up
 
         costs, towards = dijkstra(self._graph, indices=goal, return_predecessors=True)
         return costs, towards
 
     def _node_at(self, point: Point) -> int | None:
-        """The nearest node in sight of a point."""
+        """Return the nearest node in sight of a point."""
         # Planning cells whose nodes may be within `SNAP` of the point.
         reach = math.ceil(SNAP / (self._block * self._grid.resolution)) + 1
         here = (at // self._block for at in self._grid.to_cell(*point))
@@ -228,7 +228,7 @@ class Roadmap:
         return None
 
     def room_at(self, points: Floats) -> Floats:
-        """Room at many points `(n, 2)` [m]."""
+        """Return the room at many points `(n, 2)` [m]."""
         column, row = ((points - self._corner) @ self._turn).T.astype(np.intp)
         cells = row * self._grid.cells.shape[1] + column
         return np.asarray(self._clearances.take(cells, mode="clip"))
@@ -273,7 +273,7 @@ class Roadmap:
 
 
 def _both_ways(graph: Any) -> Any:
-    """A graph whose edges are given in one direction each, with both.
+    """Return a graph whose edges are given in one direction each, with both.
 
     Once for all searches, each of which would turn the graph around again otherwise. Edges of a
     node keep the order in which an undirected search looks at them, which decides between ways

@@ -49,7 +49,7 @@ def write_site(site: Site, folder: Path) -> Path:
 
 
 def features_of(site: Site) -> Iterator[Feature]:
-    """All that is drawn on a site, in metres."""
+    """Yield all that is drawn on a site, in metres."""
     yield from (_ground(room, site.ceiling) for room in site.rooms)
     yield from () if site.rooms else _floor(site)
     for wall in site.wall_lines if site.rooms else ():
@@ -78,7 +78,7 @@ def _ground(room: Room, ceiling: float) -> Feature:
 
 
 def _floor(site: Site) -> Iterator[Feature]:
-    """The floor of a bare map as one room, with what stands in it as solids."""
+    """Yield the floor of a bare map as one room, with what stands in it as solids."""
     walls = [shapely.LineString(wall.reshape(2, 2)) for wall in site.walls]
     pieces = shapely.get_parts(shapely.union_all(walls))  # cut where they cross
     faces: list[Any] = list(shapely.get_parts(shapely.polygonize(list(pieces))))

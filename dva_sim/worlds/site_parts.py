@@ -80,7 +80,7 @@ class Lookup(Generic[T]):
         self._near: dict[tuple[int, int], list[T]] = {}
 
     def at(self, x: float, y: float) -> T | None:
-        """The area around a point [m], or None outside all."""
+        """Return the area around a point [m], or None outside all."""
         square = math.floor(x / SQUARE), math.floor(y / SQUARE)
         near = self._near.get(square)
         if near is None:
@@ -90,7 +90,7 @@ class Lookup(Generic[T]):
         return next((area for area in near if area.contains(x, y)), None)
 
     def _areas_near(self, column: int, row: int) -> list[T]:
-        """Those whose box touches a square of a lattice."""
+        """Return those whose box touches a square of a lattice."""
         low = np.array([column, row]) * SQUARE
         high = np.array([column + 1, row + 1]) * SQUARE
         touch = np.all((self._boxes[:, :2] <= high) & (self._boxes[:, 2:] >= low), axis=1)

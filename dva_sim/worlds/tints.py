@@ -13,7 +13,7 @@ GRASS = "#dfe9d4"
 
 
 def floor_tint(room: Room, tints: dict[str, str]) -> str:
-    """The colour of a room's floor; rooms of one purpose have one colour.
+    """Return the colour of a room's floor; rooms of one purpose have one colour.
 
     Args:
         tints: Those of the rooms before it, by purpose; a new one is added.

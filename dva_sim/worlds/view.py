@@ -128,7 +128,7 @@ def set_limits(ax: Axes, site: Site) -> None:
 
 # --- ground ----------------------------------------------------------------------------
 def _draw_rooms(ax: Axes, site: Site) -> None:
-    """Yards below paths below rooms; rooms of one purpose have one colour."""
+    """Draw yards below paths below rooms; rooms of one purpose have one colour."""
     tints: dict[str, str] = {}
     rooms = sorted(site.rooms, key=lambda room: (not room.outdoor, room.paved))
     colours = [floor_tint(room, tints) for room in rooms]
@@ -140,7 +140,7 @@ def _draw_rooms(ax: Axes, site: Site) -> None:
 
 
 def _draw_grid(ax: Axes, site: Site) -> None:
-    """The floor of a bare map, and what stands on it."""
+    """Draw the floor of a bare map, and what stands on it."""
     grid = site.grid
     floor = grid.floor(FOOTPRINT)
     shades = np.ma.masked_where(~ndimage.binary_fill_holes(floor), floor)
@@ -162,7 +162,7 @@ def _draw_grid(ax: Axes, site: Site) -> None:
 
 # --- walls and ways through them -------------------------------------------------------
 def _draw_walls(ax: Axes, site: Site) -> None:
-    """Walls as one shape in metres, so that they keep their width when somebody zooms."""
+    """Draw walls as one shape in metres, so that they keep their width when somebody zooms."""
     width = WALL_WIDTH if site.rooms else WALL_WIDTH / 2
     lines = shapely.multilinestrings(site.wall_lines.reshape(-1, 2, 2))
     area = shapely.buffer(lines, width / 2, cap_style="square", join_style="mitre")
@@ -170,7 +170,7 @@ def _draw_walls(ax: Axes, site: Site) -> None:
 
 
 def _draw_doors(ax: Axes, site: Site) -> None:
-    """Leaves that stand open, and the arcs they swing through."""
+    """Draw leaves that stand open, and the arcs they swing through."""
     leaves = []
     arcs = []
     busy = Counter(name for o in site.openings for name in (o.room_a, o.room_b) if name)
@@ -199,7 +199,7 @@ def _hung(site: Site, busy: Counter[str], ends: Floats) -> tuple[Floats, Floats]
 
 
 def _draw_exit(ax: Axes, way: Exit) -> None:
-    """A green bar in the wall and an arrow outwards."""
+    """Draw a green bar in the wall and an arrow outwards."""
     x1, y1, x2, y2 = way.ends
     ax.plot([x1, x2], [y1, y2], color=EXIT, lw=2.4, solid_capstyle="butt", zorder=3.2)
     out = np.array([math.cos(way.heading), math.sin(way.heading)])
@@ -225,7 +225,7 @@ def _draw_zones(ax: Axes, site: Site) -> None:
 
 
 def _draw_coverage(ax: Axes, site: Site) -> None:
-    """Each coverage where no later one is drawn over it."""
+    """Draw each coverage where no later one is drawn over it."""
     above: Any = shapely.Polygon()
     for area in reversed(site.wifi):
         polygon = area.area
@@ -236,13 +236,13 @@ def _draw_coverage(ax: Axes, site: Site) -> None:
 
 
 def _fill(ax: Axes, area: Any, **style: Any) -> None:
-    """A shapely area, holes and all."""
+    """Fill a shapely area, holes and all."""
     if not area.is_empty:
         ax.add_patch(PathPatch(_outline(area), **style))
 
 
 def _outline(area: Any) -> Outline:
-    """The rings of a shapely area: outwards and holes turn opposite ways."""
+    """Return the rings of a shapely area: outwards and holes turn opposite ways."""
     oriented = shapely.get_parts(shapely.orient_polygons(area))
     rings = (shapely.get_coordinates(ring) for ring in shapely.get_rings(oriented))
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
@@ -277,7 +277,7 @@ def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
 
 
 def poster(site: Site, coverage: bool) -> Figure:
-    """The picture itself."""
+    """Return the picture itself."""
     (left, right), (low, high) = limits(site)
     across = right - left
     up = high - low
@@ -305,7 +305,7 @@ def poster(site: Site, coverage: bool) -> Figure:
 
 
 def _handles(site: Site, coverage: bool) -> list[Artist]:
-    """Only of what is there."""
+    """Return handles only of what is there."""
     handles = [_mark("P", "guard post", INK)] if site.guard_posts else []
     if site.robot_bases:
         handles.insert(0, _mark("o", "robot base", INK, mfc="none", ms=6))

@@ -47,7 +47,7 @@ BARS = (1, 2, 5, 10, 20, 50, 100)  # lengths of a scale bar [m]
 
 
 def points_per_metre(ax: Axes) -> float:
-    """The scale of the picture, which keeps its aspect."""
+    """Return the scale of the picture, which keeps its aspect."""
     figure: Any = ax.get_figure(root=True)
     _, _, width, height = ax.get_position().bounds
     inches = figure.get_size_inches()
@@ -112,14 +112,14 @@ def _draw_desks(ax: Axes, site: Site) -> None:
 
 
 def draw_views(ax: Axes, site: Site) -> None:
-    """The floor that each fixed camera sees."""
+    """Draw the floor that each fixed camera sees."""
     for camera in site.cameras:
         seen = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.08, lw=0, zorder=1.8)
         ax.add_patch(seen)
 
 
 def view_of(site: Site, camera: FixedCamera) -> Floats:
-    """Corners `(n, 2)` [m] of what a camera sees up to its range; walls hide the rest."""
+    """Return corners `(n, 2)` [m] of what a camera sees up to its range; walls hide the rest."""
     spread = np.linspace(-0.5, 0.5, RAYS) * camera.field_of_view
     rays = np.stack([np.cos(camera.heading + spread), np.sin(camera.heading + spread)], axis=1)
     eye = np.array([camera.x, camera.y])
@@ -135,7 +135,7 @@ def view_of(site: Site, camera: FixedCamera) -> Floats:
 
 
 def mast() -> Path:
-    """An antenna with a wave on both sides, as a marker."""
+    """Return an antenna with a wave on both sides, as a marker."""
     pole = Path([(0, -1), (0, 0.3)])
     waves = []
     for radius, start in itertools.product((0.45, 0.85), (-45, 135)):
@@ -212,7 +212,7 @@ def _things(site: Site) -> list[Any]:
 def _best(
     area: Any, name: str, things: Any, metre: float, least: float
 ) -> tuple[NameLayout, float, float] | None:
-    """The most legible setting that fits, and where."""
+    """Return the most legible setting that fits, and where."""
     if area.is_empty:
         return None
     shapely.prepare(area)
@@ -238,7 +238,7 @@ def _best(
 
 @lru_cache(maxsize=4096)
 def _settings(name: str) -> tuple[NameLayout, ...]:
-    """All ways to write a name, the most legible first; at last only its number."""
+    """Return all ways to write a name, the most legible first; at last only its number."""
     texts = [(text, 1.0) for text in _wraps(name)]
     number = re.search(r"\w?\d+$|\b[A-Z]$", name)
     texts += [(number[0], ABRIDGED)] if number else []
@@ -252,7 +252,7 @@ def _settings(name: str) -> tuple[NameLayout, ...]:
 
 @lru_cache(maxsize=4096)
 def _wraps(name: str) -> tuple[str, ...]:
-    """The name in one line, and in the most even two and three lines."""
+    """Return the name in one line, and in the most even two and three lines."""
     words = name.split()
     texts = [name]
     for lines in range(2, min(MOST_LINES, len(words)) + 1):
@@ -266,7 +266,7 @@ def _wraps(name: str) -> tuple[str, ...]:
 
 
 def _box(setting: NameLayout) -> tuple[float, float]:
-    """Width and height of a setting [pt]."""
+    """Return the width and height of a setting [pt]."""
     lines = setting.text.split("\n")
     long = max(map(_width, lines)) * setting.size
     high = LINE * len(lines) * setting.size
@@ -307,7 +307,7 @@ def _spots(area: Any, width: float, height: float) -> NDArray[np.float64]:
 
 
 def draw_scale_bar(ax: Axes, site: Site) -> None:
-    """A bar of a round length, half dark and half light, below the site."""
+    """Draw a bar of a round length, half dark and half light, below the site."""
     xmin, _, xmax, _ = site.extent
     length = max(n for n in BARS if n <= max(1.0, (xmax - xmin) / 4))
     y = _below(ax, site)
@@ -319,7 +319,7 @@ def draw_scale_bar(ax: Axes, site: Site) -> None:
 
 
 def draw_north(ax: Axes, site: Site) -> None:
-    """An arrow to the north; a bare map does not say where that is."""
+    """Draw an arrow to the north; a bare map does not say where that is."""
     if not site.rooms:
         return
     room = site.extent[1] - ax.get_ylim()[0]
@@ -337,5 +337,5 @@ def draw_north(ax: Axes, site: Site) -> None:
 
 
 def _below(ax: Axes, site: Site) -> float:
-    """The middle of the room below the site [m]."""
+    """Return the middle of the room below the site [m]."""
     return (ax.get_ylim()[0] + site.extent[1]) / 2

@@ -226,7 +226,7 @@ class PeriodEstimate:
         return move
 
     def _lasted(self, lasts: float, asked: float) -> None:
-        """A move lasted so long [s]: the whole periods just below what was asked, or just above."""
+        """Note how long a move lasted [s]: the whole periods just below or above what was asked."""
         whole, part = np.divmod(asked / self._periods, 1.0)
         less, more = (
             np.exp(-0.5 * ((lasts - count * self._periods) / self.BLURRED) ** 2)

@@ -381,7 +381,7 @@ class HeldRobot:
             self._inputs.append(given)
 
     def acted(self, made: float, sample_age: float) -> Input | None:
-        """The newest input behind a command made then [s], of samples so old on average [s]."""
+        """Return the newest input behind a command made then, of samples so old on average [s]."""
         newest = None
         while self._inputs and self._inputs[0].time <= made - sample_age:
             newest = self._inputs.popleft()

@@ -126,7 +126,7 @@ def _keeping(
     limits: Sequence[StrainLimit],
     habits: LeavingHabits,
 ) -> Escape | None:
-    """The nearest refuge on a way that keeps some limits, around more and more bad places."""
+    """Return the nearest refuge on a way that keeps limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
         found: dict[Point, None] = {}

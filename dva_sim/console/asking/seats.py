@@ -63,7 +63,7 @@ class Seats:
         return here.union(free)
 
     def sit(self, client: str, rather: int | None = None) -> int | None:
-        """The number of the seat of a client: its own, `rather`, or the lowest that is free.
+        """Return the number of the seat of a client: its own, `rather`, or the lowest that is free.
 
         None: there is none.
         """
@@ -78,17 +78,17 @@ class Seats:
         return free
 
     def sit_at(self, client: str, number: int) -> None:
-        """A client takes a seat that is its own."""
+        """Let a client take a seat that is its own."""
         self.taken[client] = TakenSeat(number)
         self._there.setdefault(client, math.inf)
 
     def stand_up(self, client: str) -> int | None:
-        """A client leaves: the seat it had."""
+        """Let a client leave; return the seat it had."""
         seat = self.taken.pop(client, None)
         return None if seat is None else seat.number
 
     def heard(self, client: str, now: float, holds: bool) -> bool:
-        """Input has come at a time [s]; False: who sends it sits nowhere."""
+        """Take an input at a time [s]; return False if its sender sits nowhere."""
         seat = self.taken.get(client)
         if seat is None:
             return False
@@ -97,7 +97,7 @@ class Seats:
         return True
 
     def silent(self, now: float) -> list[str]:
-        """Clients that held a control and have since been silent; each is reported once."""
+        """Return clients that held a control and have since been silent; each is reported once."""
         late = [
             client
             for client, seat in self.taken.items()

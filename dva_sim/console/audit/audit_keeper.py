@@ -40,7 +40,7 @@ _Asked = tuple[AuditEntry | None, Then]
 
 
 def now_utc() -> str:
-    """The clock on the wall, to the millisecond."""
+    """Return the clock on the wall, to the millisecond."""
     return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
@@ -134,7 +134,7 @@ class AuditKeeper:
     # --- in the world's thread ------------------------------------------------------------------
 
     def fileno(self) -> int:
-        """Can be read when there is something for `take`."""
+        """Return the file that can be read when there is something for `take`."""
         return self._hears.fileno()
 
     def take(self) -> None:

@@ -16,7 +16,7 @@ MOST_OVERRIDES = 50  # of the last that are told one by one
 
 
 def measured(rows: Iterable[AuditRow]) -> AuditMeasures:
-    """Times to acknowledge and to assign, and what people did otherwise than the policy.
+    """Return times to acknowledge and to assign, and what people did otherwise than the policy.
 
     Times count from the first report of an event to the first time that it was done.
     """
@@ -58,7 +58,7 @@ def _times(rows: Iterable[AuditRow]) -> TimesTaken:
 
 
 def _lost(overrides: Sequence[AuditRow]) -> float | None:
-    """By how much those who were sent are expected later than the policy's, in the median [s]."""
+    """Return how much later those sent are expected than the policy's, in the median [s]."""
     known = [
         did - advised
         for row in overrides

@@ -137,5 +137,5 @@ def name_of_page(client: str) -> str:
 
 
 def _short(value: Any) -> Any:
-    """A time to the millisecond; all else as it is."""
+    """Return a time to the millisecond; all else as it is."""
     return round(value, 3) if isinstance(value, float) else value

@@ -121,7 +121,7 @@ class DecisionActions:
         return None if status is None else status.decisions
 
     def _device(self, label: str) -> str:
-        """The id of a device by its label.
+        """Return the id of a device by its label.
 
         Raises:
             Refused: the DVA has listed none of that label.

@@ -66,7 +66,7 @@ class Seating:
         return None
 
     def let_in(self, number: int, person: PersonAgent) -> None:
-        """A person takes part, in a seat of its own."""
+        """Let a person take part, in a seat of its own."""
         person.on_robot = self._on_robot
         self.persons[number] = person
 
@@ -83,7 +83,7 @@ class Seating:
 
 
 def leave_seats(seating: Seating, clock: PacedClock) -> None:
-    """Everybody gives back what he holds, and a moment is left for the word of it."""
+    """Let everybody give back what they hold, and leave a moment for the word of it."""
     for person in seating.persons.values():
         person.release(lambda *_: None)
     clock.pace(paused=False)

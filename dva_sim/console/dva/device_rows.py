@@ -79,7 +79,7 @@ def listed_device_row(
     is_fake: bool,
     may_revoke: bool,
 ) -> DeviceRow:
-    """A device, as the DVA lists it and as it is heard here."""
+    """Return a device, as the DVA lists it and as it is heard here."""
     is_stopped = emergency_of(device_state, now, {}) is not None
     device = device_state.device
     status = device_state.status
@@ -117,7 +117,7 @@ class DeviceRows:
         self._commands: dict[str, Rate] = {}
 
     def rows(self, fakes: Collection[str]) -> list[DeviceRow]:
-        """A row for each, those that are there first; to be asked for once a second.
+        """Return a row for each, those that are there first; to be asked for once a second.
 
         Args:
             fakes: Ids of those that were added by hand.
@@ -159,7 +159,7 @@ class DeviceRows:
         return EMERGENCY if booked.is_stopped else booked.mode
 
     def _rate_of(self, robot: RobotAgent | None, now: float) -> float | None:
-        """Commands in a second; of a robot outside it is unknown."""
+        """Return commands in a second; of a robot outside it is unknown."""
         if robot is None:
             return None
         return self._commands.setdefault(robot.device.id_tag, Rate()).of(robot.applied, now)

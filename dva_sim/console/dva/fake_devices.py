@@ -117,7 +117,7 @@ class FakeDevices:
             self._dismiss(device.id_tag)
 
     def _identity(self, line: FakeAsked) -> tuple[str, str]:
-        """Id and address, made where they were not given.
+        """Return the id and address, made where they were not given.
 
         Raises:
             Refused: the id is taken, or is none.

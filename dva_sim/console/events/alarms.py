@@ -189,13 +189,13 @@ class Alarms:
     # --- what people do ---------------------------------------------------------------------
 
     def members(self, key: str) -> list[str]:
-        """The alarms that a row of the list stands for; none if there is no such row."""
+        """Return the alarms that a row of the list stands for; none if there is no such row."""
         if key in self.known:
             return [key]
         return [each for each, alarm in self.known.items() if _group(alarm.condition) == key]
 
     def acknowledge(self, key: str, by: str) -> None:
-        """Somebody has seen an alarm; what is over as well is none any more."""
+        """Note that somebody has seen an alarm; one that is over as well goes."""
         alarm = self.known.get(key)
         if alarm is None:
             return
@@ -212,13 +212,13 @@ class Alarms:
         return is_open and alarm.condition.priority == PRIORITIES[0]
 
     def shelve(self, key: str, seconds: float, by: str, now: float, why: str = "") -> None:
-        """Somebody cannot act on an alarm now: out of the list, for so long [s]."""
+        """Take an alarm out of the list for so long [s], as nobody can act on it now."""
         until = now + min(seconds, LONGEST_SHELF)
         alarm = replace(self.known[key], shelved_until=until, shelved_by=by, shelved_why=why)
         self.known[key] = alarm
 
     def unshelve(self, key: str, now: float) -> None:
-        """An alarm is back in the list; what lasts is new there again."""
+        """Put an alarm back in the list; what lasts is new there again."""
         alarm = replace(self.known[key], shelved_until=None, shelved_by="", shelved_why="")
         if alarm.is_on:
             alarm = replace(alarm, state=AlarmState.UNACKNOWLEDGED, raised=now, seen_by="")
@@ -228,7 +228,7 @@ class Alarms:
     # --- what is shown ----------------------------------------------------------------------
 
     def rows(self, now: float) -> list[AlarmRow]:
-        """The list: the gravest first, and of those the newest that nobody has seen."""
+        """Return the list: the gravest first, and of those the newest that nobody has seen."""
         listed = [alarm for alarm in self.known.values() if alarm.shelved_until is None]
         return [_row(alarms, now) for alarms in sorted(self._folded(listed), key=_rank)]
 
@@ -239,7 +239,7 @@ class Alarms:
         return [_row([alarm], now) for alarm in found]
 
     def _folded(self, listed: Sequence[RaisedAlarm]) -> Iterator[list[RaisedAlarm]]:
-        """Each for itself, or in a flood those of a kind and place together."""
+        """Return each for itself, or in a flood those of a kind and place together."""
         groups: dict[str, list[RaisedAlarm]] = {}
         for alarm in listed:
             key = _group(alarm.condition) if self.is_flood else alarm.condition.key
@@ -265,7 +265,7 @@ def _rank(alarms: Sequence[RaisedAlarm]) -> tuple[int, int, float, str]:
 
 
 def _row(alarms: Sequence[RaisedAlarm], now: float) -> AlarmRow:
-    """A row of the list, for one alarm or for several that are alike."""
+    """Return a row of the list, for one alarm or for several that are alike."""
     first = min(alarms, key=lambda alarm: _rank([alarm]))
     condition = first.condition
     count = len(alarms)

@@ -99,7 +99,7 @@ class ConsoleAlarms:
         }
 
     def _broken(self) -> Iterator[AlarmCondition]:
-        """Safety rules that are broken: for good, so that somebody has to see it."""
+        """Yield the safety rules that are broken: for good, so that somebody has to see it."""
         for breach in self._breaches():
             text = f"{breach.rule} broken by {breach.who}: {breach.what}"
             key = f"rule {breach.rule} {breach.who}"
@@ -109,7 +109,7 @@ class ConsoleAlarms:
             )
 
     def _nobody(self, events: Iterable[SiteEventShown]) -> Iterator[AlarmCondition]:
-        """Events wait, and nobody is free to go."""
+        """Yield the condition that events wait, and nobody is free to go."""
         waits = sum(1 for event in events if event["state"] == "pending")
         if waits and not _is_somebody_free(self._agent):
             text = f"nobody is left to send, and {waits} wait"
@@ -118,7 +118,7 @@ class ConsoleAlarms:
     # --- what people do -----------------------------------------------------------------------
 
     def members(self, key: Any) -> list[str]:
-        """The alarms that a row stands for.
+        """Return the alarms that a row stands for.
 
         Raises:
             Refused: there is no such row any more.
@@ -141,11 +141,11 @@ class ConsoleAlarms:
         }
 
     def acknowledge(self, key: str, by: str) -> None:
-        """Somebody has seen an alarm."""
+        """Note that somebody has seen an alarm."""
         self.alarms.acknowledge(key, by)
 
     def shelve(self, keys: Sequence[str], seconds: float, by: str, why: str) -> None:
-        """Somebody cannot act on alarms now.
+        """Shelve alarms on which nobody can act now.
 
         Raises:
             Refused: one of them is critical, and nobody has acknowledged it.
@@ -156,7 +156,7 @@ class ConsoleAlarms:
             self.alarms.shelve(key, seconds, by, self._clock(), why)
 
     def unshelve(self, keys: Iterable[str]) -> None:
-        """They are back in the list."""
+        """Put alarms back in the list."""
         for key in keys:
             self.alarms.unshelve(key, self._clock())
 

@@ -175,7 +175,7 @@ def dispatch_shown(status: m.DispatchStatus | None, at: float) -> DispatchShown 
 
 
 def moment_ms(seconds: float) -> int:
-    """To the tenth of a second: what is said twice of the same moment is the same."""
+    """Return the time to the tenth of a second [ms]: one moment said twice stays one."""
     return 100 * round(10 * seconds)
 
 

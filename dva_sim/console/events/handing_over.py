@@ -59,7 +59,7 @@ class HandingOver:
         self._count = 0
 
     def offer(self, offer: Offer) -> None:
-        """Somebody offers work; an older offer between the same two is replaced."""
+        """Offer work; an older offer between the same two is replaced."""
         pair = offer.sender_client, offer.client
         for number, old in list(self._offers.items()):
             if (old.sender_client, old.client) == pair and (
@@ -84,7 +84,7 @@ class HandingOver:
         return offer
 
     def give(self, event: int, to: str) -> None:
-        """Somebody answers for an event from now on."""
+        """Let somebody answer for an event from now on."""
         self.owners[event] = to
         if len(self.owners) > MOST_OWNERS:
             del self.owners[next(iter(self.owners))]

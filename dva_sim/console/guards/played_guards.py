@@ -28,18 +28,18 @@ class PlayedGuards:
         self._left: list[str] = []  # who is to be told so
 
     def named(self, label: str) -> PersonGuard | None:
-        """The guard of a label, if people may play it."""
+        """Return the guard of a label, if people may play it."""
         found = (g for g in self._run.field.guards if g.device.label == label)
         guard = next(found, None)
         return guard if isinstance(guard, PersonGuard) else None
 
     def join(self, client: str, guard: PersonGuard) -> None:
-        """A page's person plays a guard."""
+        """Let a page's person play a guard."""
         self.by_client[client] = guard
         guard.join()
 
     def leave(self, client: str) -> bool:
-        """A page's person plays no longer; whether one did."""
+        """End the play of a page's person; return True if there was one."""
         guard = self.by_client.pop(client, None)
         if guard is not None:
             guard.leave()
@@ -48,7 +48,7 @@ class PlayedGuards:
         return guard is not None
 
     def lines(self) -> Iterator[tuple[str, GuardLine]]:
-        """A line for each who plays, and one more for who plays no longer."""
+        """Yield a line for each who plays, and one more for who plays no longer."""
         gone = self._left
         self._left = []
         for client in gone:
@@ -71,7 +71,7 @@ class PlayedGuards:
         }
 
     def _order(self, client: str, guard: PersonGuard) -> GuardOrder | None:
-        """The order, and the way there from where the person stands."""
+        """Return the order, and the way there from where the person stands."""
         order = guard.order
         if order is None:
             return None

@@ -37,5 +37,5 @@ def own_hosts(given: Iterable[str]) -> list[str]:
 
 
 def address_of(host: str, port: int, scheme: str = "http") -> str:
-    """The address of a page's root."""
+    """Return the address of a page's root."""
     return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}/"

@@ -125,7 +125,7 @@ NEEDED: tuple[tuple[str, str, float], ...] = (
 
 
 def palettes() -> tuple[Palette, Palette]:
-    """All colours, in light and in dark."""
+    """Return all colours, in light and in dark."""
     both = {**COLOURS, **_patterns()}
     return tuple({name: pair[i] for name, pair in both.items()} for i in (0, 1))  # type: ignore[return-value]
 

@@ -54,7 +54,7 @@ class ConsoleSubject(Protocol):
     dropped: Callable[[], int]
 
     def serve_cameras(self, base: str) -> None:
-        """The robots' pictures are to be had below this URL from now on."""
+        """Serve the robots' pictures below this URL from now on."""
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
@@ -157,7 +157,7 @@ class ConsoleProcesses:
         return web
 
     def _start_pictures(self) -> PipedChild:
-        """Our copy of its end stays open, so that another one can take its place."""
+        """Return the our copy of its end stays open, so that another one can take its place."""
         end = self._to_web
         assert end is not None
         words = ["--web-fd", str(end.fileno())]
@@ -179,7 +179,7 @@ class ConsoleProcesses:
         subject.clock.watch(web.pipe.fileno(), hear)
 
     def _draw(self, subject: ConsoleSubject, pictures: PipedChild) -> None:
-        """Without pictures all else goes on, and another process draws from then on."""
+        """Draw in another process from then on; without pictures all else goes on."""
         subject.show = pictures.pipe.put
 
         def hear() -> None:
@@ -202,7 +202,7 @@ class ConsoleProcesses:
             child.pipe.flush()
 
     def _say_of_phones(self) -> None:
-        """Their address, also for a camera; and what people should know of it."""
+        """Say the phones' address, also for a camera, and what people should know of it."""
         for entry in self.serving["notices"]:
             self._say(entry)
         if address := self.serving["phone"]:

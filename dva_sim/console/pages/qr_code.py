@@ -14,7 +14,7 @@ _RESET = "\x1b[0m"
 
 
 def svg(address: str) -> bytes:
-    """For a page: dark on white in both themes, as cameras want it."""
+    """Return the code for a page: dark on white in both themes, as cameras want it."""
     data = io.BytesIO()
     code = segno.make_qr(address, error="m")
     code.save(data, kind="svg", border=RIM, dark="#000", light="#fff", scale=4, nl=False)
@@ -22,7 +22,7 @@ def svg(address: str) -> bytes:
 
 
 def half_blocks(address: str, colours: bool) -> str:
-    """For a terminal: two modules in each character.
+    """Return the code for a terminal: two modules in each character.
 
     Args:
         address: Address to encode.

@@ -74,7 +74,7 @@ class NamedPeople:
             bench.appoint(self._system.device.id_tag, UNATTENDED)
 
     def attend(self, _: Mapping[str, str]) -> None:
-        """Note which pages are open: all are one device for the DVA, whose role it alone knows."""
+        """Note which pages are open: all are one device for the DVA, which alone knows its role."""
 
     def names(self) -> Mapping[str, str]:
         """Return the name of each person who has joined, by page."""

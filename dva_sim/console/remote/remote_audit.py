@@ -92,7 +92,7 @@ class RemoteAudit(Audited):
             asked.finish()
 
     def heard(self, record: m.AuditRecord) -> None:
-        """The DVA tells of a decision."""
+        """Take the DVA's record of a decision."""
         if record.author == self._system.device.id_tag:
             for number, asked in self._asked.items():
                 if asked.matches(record):

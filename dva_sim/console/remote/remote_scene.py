@@ -17,7 +17,7 @@ AROUND: Final = 40.0  # of the first position, where no site is known [m]
 def remote_scene(
     things: list[ThingShown], address: str, own_pattern: str, site: Site | None, frame: GeoFrame
 ) -> SceneLine:
-    """The first line that a page gets."""
+    """Return the first line that a page gets."""
     return {
         "k": "scene",
         "t": 0,
@@ -41,7 +41,7 @@ def remote_scene(
 
 
 def nowhere(frame: GeoFrame) -> SiteShown:
-    """A site of which nothing is known but where on earth it lies."""
+    """Return a site of which nothing is known but where on earth it lies."""
     return {
         "name": "unknown",
         "extent_m": [-AROUND, -AROUND, AROUND, AROUND],

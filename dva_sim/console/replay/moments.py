@@ -25,7 +25,7 @@ class RecordedTracks:
         self._times = {label: [p.time for p in track] for label, track in tracks.items()}
 
     def places(self, now: float) -> Iterator[tuple[str, TrackPoint, float]]:
-        """Everybody who is on the site: label, where, and how fast [m/s]."""
+        """Yield everybody who is on the site: label, place, and speed [m/s]."""
         for label, track in self._tracks.items():
             index = bisect_right(self._times[label], now)
             if index == 0:
@@ -59,7 +59,7 @@ def set_point(drive: DriveLog | None, now: float) -> tuple[float, float]:
 
 
 def commands_hz(drive: DriveLog, now: float) -> float:
-    """Commands in the last second [1/s]."""
+    """Return commands in the last second [1/s]."""
     first, last = (
         bisect_right(drive.commands, when, key=lambda command: command[0])
         for when in (now - 1.0, now)

@@ -78,7 +78,7 @@ class ExchangeLog:
                 self._add(asked, sent, data)
 
     def _add(self, asked: dict[tuple[str, bytes], list[Any]], sent: Sent, data: bytes) -> None:
-        """A command counts as published until it is found to be answered."""
+        """Add a line; a command counts as published until it is found to be answered."""
         is_published = PUBLISHED.search(data) is not None or _COMMAND in data
         when = round(1000 * sent.time)
         line = [len(self._lines) + 1, when, data.decode("latin-1"), None, None, int(is_published)]
@@ -92,7 +92,7 @@ class ExchangeLog:
         return bisect_right(self._times, now)
 
     def batches(self, name: str, sent: int, end: int) -> list[ExchangesLine]:
-        """Lines for pages, of those after the first `sent` up to the first `end`."""
+        """Return lines for pages, of those after the first `sent` up to the first `end`."""
         starts = range(max(sent, end - FIRST), end, LOG_BATCH)
         return [
             {"k": "log", "log": name, "lines": self._lines[start : min(end, start + LOG_BATCH)]}
@@ -362,7 +362,7 @@ class Player:
 
 @contextmanager
 def playing(player: Player) -> Iterator[Player]:
-    """A player that leaves nothing behind."""
+    """Yield a player that leaves nothing behind."""
     try:
         yield player
     finally:

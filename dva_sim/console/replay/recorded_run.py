@@ -82,7 +82,7 @@ class RecordedDevices:
     def rows(
         self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]
     ) -> list[DeviceRow]:
-        """A row for each that had registered by then; what nobody recorded is open.
+        """Return a row for each that had registered by then; what nobody recorded is open.
 
         Args:
             now: The moment [s].
@@ -208,7 +208,7 @@ class RecordedRun:
     # --- what does not change --------------------------------------------------------------
 
     def scene(self) -> SceneLine:
-        """The first line."""
+        """Return the first line."""
         playback = self.playback
         link = playback.scenario.link
         how: LinkShown = {
@@ -239,7 +239,7 @@ class RecordedRun:
         return line
 
     def _marks(self) -> list[Happened]:
-        """Moments to jump to, in order; of too many, evenly chosen ones."""
+        """Return moments to jump to, in order; of too many, evenly chosen ones."""
         timeline = self.playback.recorder.timeline
         marks = [moment for moment in timeline if moment.kind in MARKED]
         step = max(1, math.ceil(len(marks) / MOST_MARKS))
@@ -261,7 +261,7 @@ class RecordedRun:
         return {"k": "pos", "t": _ms(now), "p": rows}
 
     def robots(self, now: float) -> list[RobotRow]:
-        """A row for each robot."""
+        """Return a row for each robot."""
         doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
         return [
             self._robot(id_tag, doing.get(self.playback.labels[id_tag], ""), now)
@@ -317,7 +317,7 @@ class RecordedRun:
         return self._windows[id_tag]
 
     def _drive_of(self, robot: str, now: float) -> DriveLog | None:
-        """The drive that goes on, if one does."""
+        """Return the drive that goes on, if one does."""
         for drive in reversed(self._drives.get(robot, [])):
             if drive.ordered <= now:
                 over = drive.ended is not None and drive.ended <= now
@@ -334,7 +334,7 @@ class RecordedRun:
         ]
 
     def devices(self, now: float) -> DevicesLine:
-        """The table of devices."""
+        """Return the table of devices."""
         if self._devices is None:
             self._devices = RecordedDevices(self.playback.recorder.traffic or (), DVA)
         ids = {thing["i"]: thing["id"] for thing in self.things.all}

@@ -71,7 +71,7 @@ class RobotLines:
         ]
 
     def line(self, row: RobotRow, speed: float, turn_rate: float, now: float) -> RobotWindowLine:
-        """The windows at a moment.
+        """Return the windows at a moment.
 
         Args:
             row: Public state of the robot at that moment.

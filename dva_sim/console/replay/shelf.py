@@ -64,7 +64,7 @@ class Shelf:
         self._kept = {one.path.name: one for one in kept}
 
     def find(self, name: str) -> Path:
-        """The recording of that name.
+        """Return the recording of that name.
 
         Raises:
             ConfigError: there is none here.
@@ -101,18 +101,18 @@ class Shelf:
 
 
 def _rows_by_name(results: Results) -> dict[str, Row]:
-    """The runs of a study by the names that their recordings have."""
+    """Return the runs of a study by the names that their recordings have."""
     return {f"{address}{SUFFIX}": row for address, row in rows_of(results).items()}
 
 
 def _answer_of(results: Results | None) -> str:
-    """The measure by which a study is answered; empty without one."""
+    """Return the measure by which a study is answered; empty without one."""
     answer = None if results is None else results.study.get("answer")
     return str(answer["measure"]) if isinstance(answer, dict) else ""
 
 
 def _measures_of(answer: str, rows: Mapping[str, Row]) -> list[str]:
-    """Those that are shown: the one that answers, and usual ones that the tables have."""
+    """Return those that are shown: the one that answers, and usual ones that the tables have."""
     row = next(iter(rows.values()), None)
     if row is None:
         return []

@@ -18,12 +18,12 @@ class Latencies:
         self._count = 0
 
     def add(self, seconds: float) -> None:
-        """Another one."""
+        """Add another one."""
         self._times.append(seconds)
         self._count += 1
 
     def line(self) -> LatencyFigures | None:
-        """The figures in milliseconds, of the newest `KEPT`; None without any."""
+        """Return the figures in milliseconds, of the newest `KEPT`; None without any."""
         if not self._times:
             return None
         ordered = sorted(self._times)

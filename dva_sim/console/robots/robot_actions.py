@@ -135,7 +135,7 @@ class RobotActions:
             del self._hands[client]  # an emergency, or a long silence, has ended it
 
     def gone(self, client: str) -> None:
-        """A page is hidden or closed: nobody has a hand on it."""
+        """End what a hidden or closed page has in hand."""
         hand = self._hands.get(client)
         if hand is not None:
             hand.holds = False
@@ -150,14 +150,14 @@ class RobotActions:
         self._windows.look()
 
     def stop(self, robots: Iterable[str]) -> None:
-        """Nobody drives these on: an emergency, or time stands still, or the machine lags."""
+        """Stop these robots: an emergency, or time stands still, or the machine lags."""
         stopped = set(robots)
         for client, hand in list(self._hands.items()):
             if hand.robot in stopped:
                 self.gone(client)
 
     def press_emergency(self, robot: str) -> None:
-        """The button at the robot itself."""
+        """Press the button at the robot itself."""
         self._windows.by_id[robot].hand.press_emergency()
 
     def release_emergency(self, robot: str, who: str) -> Decision:

@@ -149,7 +149,7 @@ class OwnStation:
 
 
 def two_free_ports(host: str) -> int:
-    """The first of two ports in a row that are free now.
+    """Return the first of two ports in a row that are free now.
 
     Raises:
         NetworkError: there are none, or the host is not this machine.

@@ -35,7 +35,7 @@ class RobotStation(Protocol):
     """Station of a robot: off, registered, listening."""
 
     def line(self) -> StationShown:
-        """State, the address at which it listens, and that of the DVA."""
+        """Return the state, the address at which it listens, and that of the DVA."""
 
 
 class AlwaysListening:
@@ -80,7 +80,7 @@ class RobotWindow:
     _sensed: tuple[float, list[SensorShown]] = field(default_factory=lambda: (-math.inf, []))
 
     def sensors(self, now: float) -> list[SensorShown]:
-        """Newest values of its sensors, looked at once a second."""
+        """Return the newest values of its sensors, looked at once a second."""
         if now - self._sensed[0] >= SENSING or now < self._sensed[0]:
             self._sensed = now, [*self._read(now)]
         return self._sensed[1]
@@ -141,11 +141,11 @@ class RobotWindows:
         }
 
     def set_usual(self, id_tag: str, seconds: float) -> None:
-        """A message usually takes a robot's computer so long from now on [s]."""
+        """Let a message usually take a robot's computer so long from now on [s]."""
         self.by_id[id_tag].faults.usually(lambda: seconds)
 
     def heard(self, id_tag: str, exchange: Exchange) -> None:
-        """A robot has heard a message, or has answered one that it had heard before."""
+        """Note that a robot has heard a message, or has answered one that it had heard before."""
         window = self.by_id[id_tag]
         again = exchange.number <= self.by_id[id_tag].newest
         if exchange.reply is not None and exchange.service_s is not None:
@@ -183,7 +183,7 @@ class RobotWindows:
     def lines(
         self, watched: Iterable[str], reason_of: Callable[[RobotAgent], str]
     ) -> Iterator[RobotWindowLine]:
-        """A line for each robot that somebody looks at.
+        """Yield a line for each robot that somebody looks at.
 
         Args:
             watched: Those, by id.

@@ -51,7 +51,7 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
 
 
 def _without_command(robot: RobotAgent, now: float) -> str:
-    """Its watchdog has stopped it, or the age limit of what it was told."""
+    """Return True if its watchdog has stopped it, or the age limit of what it was told."""
     silent = now - robot.controller.last_valid
     if robot.stale:
         return f"commands are older than {robot.controller.limits.max_age:g} s when they come"

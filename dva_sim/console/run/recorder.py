@@ -72,7 +72,7 @@ class ConsoleRecorder(Recorder):
         return self._sent.pop(payload, None)
 
     def message_taken(self, node: str, payload: bytes) -> None:
-        """A device of ours takes a message over a real link: one of others is kept."""
+        """Keep a message that a device of ours has taken from others over a real link."""
         if self.kept is not None:
             self.kept.message(node, payload, sent=False)
 

@@ -18,7 +18,7 @@ _LAWS = ("delay_law", "delay_log")  # of which jitter takes the place
 
 
 def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
-    """A link with other numbers in both directions; jitter is kept within the delay.
+    """Return a link with other numbers in both directions; jitter is kept within the delay.
 
     Raises:
         ConfigError: what cannot be, such as a rate where a recorded trace gives it.
@@ -44,7 +44,7 @@ def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
 
 
 def with_link(scenario: Scenario, link: LinkConfig, processing: float | None) -> Scenario:
-    """A scenario over another link, with time-outs as they are, or as long as that needs."""
+    """Return a scenario over another link, with time-outs as they are, or as long as that needs."""
     robot = scenario.robot
     if processing is not None:
         robot = robot.model_copy(update={"processing_s": processing})

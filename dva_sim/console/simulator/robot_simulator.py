@@ -104,7 +104,7 @@ class LoneRobotActions:
 
     @does("release")
     def _release(self, _: str, line: Nothing, on_result: OnResult) -> None:
-        """Nothing is in hand but by `manual_take`."""
+        """Release what `manual_take` has in hand, and nothing else."""
         on_result(True, "released")
 
     @does("gone")

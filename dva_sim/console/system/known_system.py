@@ -151,7 +151,7 @@ class KnownSystem:
             self.bench.appoint(self.device.id_tag, ControlRoomRole.SUPERVISE, then)
 
     def move(self, address: str) -> None:
-        """The DVA listens elsewhere."""
+        """Follow the DVA to another address."""
         self.dva = address
         self.device.introduce(DVA, address)
         self.on_devices()
@@ -185,7 +185,7 @@ class KnownSystem:
         self.agent.ask(m.GetDeviceList(), answered, failed)
 
     def _ask_again(self) -> None:
-        """Nothing of what was told of events counts until the DVA has told all there are."""
+        """Discard what was told of events until the DVA has told all there are."""
         self.has_all_events = False
         self._forgotten = self.clock.now
         self.agent.events.clear()
@@ -234,7 +234,7 @@ class KnownSystem:
         return [thing for thing in self.things.all if thing["id"] not in gone]
 
     def robots(self) -> list[str]:
-        """Ids of the robots that the DVA lists, but for those of the console's own run."""
+        """Return ids of the robots that the DVA lists, but for those of the console's own run."""
         devices = self.state.devices.items()
         return [i for i, one in devices if one.device.device_type == ROBOT and not one.is_own]
 
@@ -249,7 +249,7 @@ class KnownSystem:
         return id_tag in self._met if entry is None else entry.listed < self._listed
 
     def id_of(self, number: int) -> str | None:
-        """The id of a thing that pages know by a number; None: there is none."""
+        """Return the id of a thing that pages know by a number; None: there is none."""
         return next((str(each["id"]) for each in self.things.all if each["i"] == number), None)
 
     def label_of(self, id_tag: str) -> str:
@@ -257,7 +257,7 @@ class KnownSystem:
         return self.labels.get(id_tag, id_tag)
 
     def named(self, given: str) -> str:
-        """The name of a device by its id, or of things by their numbers, as in `0, 1`."""
+        """Return the name of a device by its id, or of things by their numbers, as in `0, 1`."""
         by_number = {str(each["i"]): each["label"] for each in self.things.all}
         words = given.split(", ")
         return ", ".join(by_number.get(one, self.label_of(one)) for one in words)
@@ -275,7 +275,7 @@ class KnownSystem:
         return self.frame is not SOMEWHERE
 
     def find_place(self) -> bool:
-        """An unknown place lies where somebody first is; whether it is found by that."""
+        """Place an unknown site where somebody first is; return whether that was possible."""
         status = next((t.status for t in self.state.devices.values() if t.status is not None), None)
         if self.is_placed or status is None:
             return False

@@ -80,7 +80,7 @@ class SystemState:
         return self._device.clock.now
 
     def list(self, devices: tuple[m.Device, ...]) -> None:
-        """The DVA says who is there."""
+        """Take the DVA's list of who is there."""
         before = {(i, entry.device) for i, entry in self.devices.items()}
         own = self._own()
         for device in devices:
@@ -107,7 +107,7 @@ class SystemState:
             self._device.forget(id_tag)
 
     def sensors(self, found: m.SensorList) -> None:
-        """The DVA says what the devices can show."""
+        """Take the DVA's list of what the devices can show."""
         for one in found.devices:
             if (state := self.devices.get(one.device)) is not None:
                 state.camera = one.camera_url

@@ -30,31 +30,31 @@ class Things:
         self.numbers: dict[str, int] = {}
 
     def add(self, id_tag: str, label: str, kind: str, body: ThingBody | None = None) -> None:
-        """Somebody comes, who may be called by the label, too."""
+        """Add somebody, who may be called by the label, too."""
         self.add_foreign(id_tag, label, kind, body)
         self.numbers[label] = self.numbers[id_tag]
 
     def add_foreign(
         self, id_tag: str, label: str, kind: str, body: ThingBody | None = None
     ) -> None:
-        """Somebody comes whose label may be that of another one."""
+        """Add somebody whose label may be that of another one."""
         number = len(self.all)
         more = body or {}
         self.all.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
         self.numbers[id_tag] = number
 
     def learn(self, id_tag: str, body: ThingBody) -> None:
-        """More is known of somebody."""
+        """Learn more of somebody."""
         number = self.numbers[id_tag]
         self.all[number] = {**self.all[number], **body}
 
     def rename(self, id_tag: str, label: str) -> None:
-        """Somebody has another label."""
+        """Give somebody another label."""
         self.all[self.numbers[id_tag]]["label"] = label
 
 
 def camera_shown(camera: CameraConfig) -> CameraShown:
-    """The camera of all robots of a scenario."""
+    """Return the camera of all robots of a scenario."""
     return {
         "field_of_view_deg": camera.field_of_view_deg,
         "range_m": camera.range_m,

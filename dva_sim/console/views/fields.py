@@ -69,7 +69,7 @@ class HazardFeed:
         return {"k": "hazards", "t": now_ms, "hazards": hazards, "fields": self._sampled(now)}
 
     def _sampled(self, now: float) -> list[FieldShown]:
-        """The fields, no more often than their cost allows."""
+        """Return the fields, no more often than their cost allows."""
         begun = time.perf_counter()
         if begun >= self._next:
             going = [i for i in self._incidents if i.is_there(now)]

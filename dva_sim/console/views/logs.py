@@ -131,7 +131,7 @@ class Logs:
             self._apply(log)
 
     def look(self, looked: Mapping[str, bool]) -> None:
-        """Pages look at these logs and no others; whether they want publications, too."""
+        """Select the logs that pages look at; whether they want publications, too."""
         self._looked = dict(looked)
         for name in looked:
             self._log(name)

@@ -51,7 +51,7 @@ def emergency_of(
 def robot_row(
     device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
 ) -> RobotRow:
-    """A robot, as it says itself."""
+    """Return a robot, as it says itself."""
     status = device_state.status
     holder = device_state.holder
     known = status if isinstance(status, m.RobotStatus) else None
@@ -75,7 +75,7 @@ def robot_row(
 
 
 def _unknown_robot(number: int, mode: str, emergency: EmergencyShown | None) -> RobotRow:
-    """A robot of which little is known; what is not is null."""
+    """Return a robot of which little is known; what is not is null."""
     return {
         "i": number,
         "mode": mode if emergency is None else EMERGENCY,

@@ -49,7 +49,7 @@ def scene_of(
     name: str,
     seed: int,
 ) -> SceneLine:
-    """The first line that a page gets.
+    """Return the first line that a page gets.
 
     Args:
         incidents: Its hazards.
@@ -79,7 +79,7 @@ def scene_of(
 
 
 def patterns_of(own: str) -> list[PatternShown]:
-    """All that may be chosen: the shipped ones, and the scenario's."""
+    """Return all that may be chosen: the shipped ones, and the scenario's."""
     names = dict.fromkeys([*PATTERNS, own])
     kinds = {name: PATTERNS.get(name) for name in names}
     return [
@@ -95,7 +95,7 @@ def patterns_of(own: str) -> list[PatternShown]:
 
 
 def site_of(site: Site) -> SiteShown:
-    """The plan of a site, in metres and as GeoJSON in degrees."""
+    """Return the plan of a site, in metres and as GeoJSON in degrees."""
     tints: dict[str, str] = {}
     shown: SiteShown = {
         "name": site.name,
@@ -148,7 +148,7 @@ def raster_of(site: Site) -> RasterShown:
 
 
 def geojson_of(site: Site) -> dict[str, Any]:
-    """Everything that is drawn on a site, with longitude and latitude."""
+    """Return everything that is drawn on a site, with longitude and latitude."""
     features = []
     for feature in features_of(site):
         there = _to_degrees(site, feature.shape)
@@ -200,5 +200,5 @@ def legend(incidents: Sequence[RunHazard]) -> list[LegendEntry]:
 
 
 def _rounded(numbers: Any) -> Any:
-    """Metres to the millimetre, as plain lists."""
+    """Return metres to the millimetre, as plain lists."""
     return np.asarray(numbers, dtype=float).round(3).tolist()

@@ -128,7 +128,7 @@ async def run(options: argparse.Namespace) -> None:
 def _phones(
     options: argparse.Namespace, tokens: Tokens, logins: Logins | None
 ) -> tuple[PhoneListener | None, list[str]]:
-    """The listener for phones, and what people should know of it.
+    """Return the listener for phones, and what people should know of it.
 
     Without a certificate all else goes on.
     """

@@ -33,7 +33,7 @@ class Tokens:
 
     @classmethod
     def drawn(cls) -> Tokens:
-        """New ones, of 192 random bits each."""
+        """Return the new ones, of 192 random bits each."""
         return cls(*(secrets.token_urlsafe(24) for _ in fields(cls)))
 
     @property
@@ -42,7 +42,7 @@ class Tokens:
         return bool(self.drive)
 
     def role_of(self, shown: str) -> Role:
-        """The role of a token; all comparisons take the same time, whatever was shown."""
+        """Return the role of a token; all comparisons take the same time, whatever was shown."""
         if not self.are_asked:
             return Role.SUPERVISE
         given = shown.encode("utf-8", "replace")
@@ -54,7 +54,7 @@ class Tokens:
         return fits[0] if fits else Role.NOBODY
 
     def of(self, role: Role) -> str:
-        """The token of a role."""
+        """Return the token of a role."""
         return str(getattr(self, role.name.lower(), self.look))
 
 
@@ -100,7 +100,7 @@ class Entrance:
         return f"{self.cookie}_login"
 
     def cookie_for(self, role: Role) -> str:
-        """The header that gives a browser its role."""
+        """Return the header that gives a browser its role."""
         return self._cookie(self.cookie, self.tokens.of(role))
 
     def cookie_of_login(self, token: str) -> str:
@@ -122,7 +122,7 @@ def rules(
     secure: bool = False,
     logins: Logins | None = None,
 ) -> Entrance:
-    """The rules of a console that listens on an address.
+    """Return the rules of a console that listens on an address.
 
     Args:
         host: Host as asked for, such as `127.0.0.1`, `0.0.0.0` or a name of this machine.

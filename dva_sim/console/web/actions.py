@@ -18,7 +18,7 @@ class NotAllowed(BadMessage):
 
 
 def read(text: str | bytes) -> dict[str, Any]:
-    """A JSON object out of a message.
+    """Return a JSON object out of a message.
 
     Raises:
         BadMessage: it is something else.
@@ -54,7 +54,7 @@ _FOR = {Role.DRIVE: "for driving", Role.DISPATCH: "for dispatch", Role.SUPERVISE
 
 
 def plain(name: str) -> str:
-    """The name of an action, for people."""
+    """Return the name of an action, for people."""
     return name.replace("_", " ")
 
 
@@ -81,7 +81,7 @@ def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dic
 
 
 def id_of(value: Any) -> str:
-    """The id by which a repeated request is known.
+    """Return the id by which a repeated request is known.
 
     Raises:
         BadMessage: it is none.

@@ -221,7 +221,7 @@ class Pages:
         return PictureStream(self._cameras.stream(viewer), partial(self._cameras.leave, viewer))
 
     async def _relayed(self, request: Request, robot: int, url: str | None) -> Response:
-        """A stream from the address that a robot elsewhere has stated."""
+        """Return a stream from the address that a robot elsewhere has stated."""
         if not url:
             return Response(status_code=204, headers=NOT_KEPT)
         viewer = self._cameras.admit(robot, request.scope[ROLE])
@@ -250,7 +250,7 @@ class Pages:
         return Response(picture.jpeg, headers=headers, media_type="image/jpeg")
 
     def _robot(self, request: Request) -> int:
-        """The robot whose label is asked for: one of the scene's, or nothing is found."""
+        """Return the robot whose label is asked for: one of the scene's, or nothing is found."""
         robot: int | None = self._simulation.labels.get(request.path_params["label"])
         if robot is None:
             raise HTTPException(404)
@@ -269,7 +269,7 @@ async def _status(_: Request, error: Exception) -> Response:
 
 
 def _for(least: Role, endpoint: Any) -> Any:
-    """An endpoint for those who may do so much."""
+    """Return an endpoint for those who may do so much."""
 
     async def guarded(request: Request) -> Response:
         if request.scope[ROLE] < least:
@@ -292,7 +292,7 @@ def make_app(
     audit: AuditPages | None = None,
     report: Path | None = None,
 ) -> ASGIApp:
-    """The whole application.
+    """Return the whole application.
 
     Args:
         access: Its rules.

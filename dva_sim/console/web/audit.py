@@ -88,7 +88,7 @@ class AuditPages:
 
 
 def rows_of(path: Path, after: int = 0, most: int | None = None) -> list[AuditRow]:
-    """The rows after a number, so many of them.
+    """Return the rows after a number, so many of them.
 
     Raises:
         ConfigError: the file holds none, or what no log writes.
@@ -125,7 +125,7 @@ def _file(suffix: str, kind: str, text: str) -> Response:
 
 
 def csv_of(rows: Sequence[AuditRow]) -> str:
-    """Rows for a spreadsheet; what it would take for a formula begins with an apostrophe.
+    """Return rows for a spreadsheet; what it would take for a formula begins with an apostrophe.
 
     References:
         OWASP, "CSV injection".
@@ -140,5 +140,5 @@ def csv_of(rows: Sequence[AuditRow]) -> str:
 
 
 def json_of(rows: Sequence[AuditRow]) -> str:
-    """Rows for programs, hashes included, so that the chain can be followed there, too."""
+    """Return rows for programs, hashes included, so that the chain can be followed there, too."""
     return json.dumps({"rows": [plain_row(row) for row in rows]}, indent=1)

@@ -39,7 +39,7 @@ class KeptCertificates(NamedTuple):
 
 
 def data_folder() -> Path:
-    """The folder of this user's data of the program, as the system has it."""
+    """Return the folder of this user's data of the program, as the system has it."""
     given = os.environ.get("XDG_DATA_HOME", "")
     home = Path("~").expanduser()
     if Path(given).is_absolute():
@@ -52,7 +52,7 @@ def data_folder() -> Path:
 
 
 def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> KeptCertificates:
-    """Authority and certificate for these hosts: those that are kept, or new ones.
+    """Return the authority and certificate for these hosts: those that are kept, or new ones.
 
     Args:
         folder: Folder of the certificates.
@@ -109,7 +109,7 @@ def _renewed(what: str, fault: str, notices: list[str], more: str = "") -> None:
 
 
 def _write(path: Path, signed: Signed) -> None:
-    """All of it or nothing, and readable by its owner alone from the first byte on."""
+    """Write all of it or nothing, readable by its owner alone from the first byte on."""
     beside = path.with_suffix(f".{os.getpid()}")
     with suppress(FileNotFoundError):
         beside.unlink()

@@ -48,7 +48,7 @@ class Hosts:
 
     @classmethod
     def of(cls, given: list[str]) -> Hosts:
-        """Names and addresses, sorted out; what can be neither is left out."""
+        """Return names and addresses, sorted out; what can be neither is left out."""
         names = set()
         addresses = set()
         for one in given:
@@ -76,7 +76,7 @@ class Signed:
 
     @classmethod
     def read(cls, data: bytes) -> Signed:
-        """Out of PEM: key and certificate in one.
+        """Return key and certificate out of one PEM.
 
         Raises:
             ValueError: it is something else, or the two do not belong together.
@@ -106,7 +106,7 @@ class Signed:
 
 
 def new_authority(machine: str, hosts: Hosts, now: datetime) -> Signed:
-    """An authority for the addresses of private networks and for what it is asked for."""
+    """Return an authority for the addresses of private networks and for what it is asked for."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = _name(f"dva-sim on {machine}"[:64])
     builder = _builder(name, name, key, now, AUTHORITY_DAYS)
@@ -129,7 +129,7 @@ def new_authority(machine: str, hosts: Hosts, now: datetime) -> Signed:
 
 
 def new_leaf(authority: Signed, hosts: Hosts, now: datetime) -> Signed:
-    """The certificate of this machine."""
+    """Return the certificate of this machine."""
     key = ec.generate_private_key(ec.SECP256R1())
     issuer = authority.certificate.subject
     builder = _builder(_name("dva-sim console"), issuer, key, now, LEAF_DAYS)

@@ -53,7 +53,7 @@ class Driver:
         self.wake.set()
 
     def next(self) -> str | None:
-        """The next message; None if all is said."""
+        """Return the next message; None if all is said."""
         if self._answers:
             return self._answers.popleft()
         text = self._seat
@@ -114,7 +114,7 @@ class Clients:
         self._count = 0
 
     def here(self) -> list[Client]:
-        """Pages whose state socket is open."""
+        """Return pages whose state socket is open."""
         return [client for client in self._all.values() if client.is_here]
 
     def acting(self) -> dict[str, str]:
@@ -207,7 +207,7 @@ class Clients:
         return fits[0] if fits else None
 
     def named(self, name: str) -> Client | None:
-        """The page of a name, if it is here."""
+        """Return the page of a name, if it is here."""
         client = self._all.get(name)
         return client if client is not None and client.is_here else None
 
@@ -218,7 +218,7 @@ class Clients:
         return client if client is not None and is_there and client.role is role else None
 
     def leave(self, client: Client) -> None:
-        """Its state socket is closed; its name is kept a while."""
+        """Note that its state socket is closed; its name is kept a while."""
         client.is_here, client.ws, client.watches = False, None, frozenset()
 
     def forget(self, client: Client) -> bool:
@@ -229,11 +229,11 @@ class Clients:
         return True
 
     def watched(self) -> Iterable[int]:
-        """Robots whose pictures somebody says to look at."""
+        """Return robots whose pictures somebody says to look at."""
         return (robot for client in self.here() for robot in client.watches)
 
     def looked(self) -> tuple[dict[str, bool], list[str]]:
-        """Logs that pages look at, each with whether publications are wanted, and tables."""
+        """Return logs that pages look at, each with whether publications are wanted, and tables."""
         logs: dict[str, bool] = {}
         tables: set[str] = set()
         for looks in (client.feed.looks for client in self.here()):
@@ -243,7 +243,7 @@ class Clients:
         return logs, sorted(tables)
 
     def wake(self) -> None:
-        """Something is new."""
+        """Wake it for something new."""
         for client in self._all.values():
             client.wake.set()
 

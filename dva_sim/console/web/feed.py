@@ -60,7 +60,7 @@ class PageFeed:
         return True
 
     def next(self) -> str | None:
-        """The next message, as JSON; None if the page has everything."""
+        """Return the next message, as JSON; None if the page has everything."""
         body = self._next_body()
         if body is None:
             return None

@@ -60,7 +60,7 @@ class Hub:
         simulation.changed = self._changed
 
     def _changed(self, kind: str, line: dict[str, Any]) -> None:
-        """Something is new: who drives gets the newest of its seat at once."""
+        """Send something new: who drives gets the newest of its seat at once."""
         if kind == "seat":
             client = self.clients.named(str(line["seat"]))
             if client is not None and client.driver is not None:
@@ -133,7 +133,7 @@ class Hub:
         client.wake.set()
 
     def _tell_looks(self) -> None:
-        """The simulation tells what somebody looks at, and no more."""
+        """Tell the simulation what somebody looks at, and no more."""
         logs, tables = self.clients.looked()
         self.simulation.send({"do": "look", "logs": logs, "tables": tables})
 
@@ -143,7 +143,7 @@ class Hub:
         self.simulation.send({"do": "here", "pages": self.clients.acting(), "users": users})
 
     def _leave(self, client: Client) -> None:
-        """A page is gone: its robots stop, and after a while others may have them."""
+        """Let a page go: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
         self._tell_here()
         self._tell_looks()
@@ -183,7 +183,7 @@ class Hub:
                 wire_of(client.ws.scope).drop(REFUSED, LOGIN_OVER)
 
     def new_program(self, role: Role) -> Client | None:
-        """A seat for a program; None if there are too many of its role or above."""
+        """Return a seat for a program; None if there are too many of its role or above."""
         program, least = self.clients.add_program(role, time.monotonic())
         if least is not None:
             self._give_back(least)
@@ -223,7 +223,7 @@ class Hub:
                 self._stop_drive(client)
 
     def _replace(self, client: Client) -> None:
-        """A page has one driving socket; the newest counts, and begins at rest."""
+        """Replace a page's driving socket; the newest counts, and begins at rest."""
         if client.driver is not None:
             client.driver.replaced = True
             client.driver.wake.set()
@@ -286,7 +286,7 @@ class Hub:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _send(self, ws: WebSocket, wake: asyncio.Event, following: Next) -> None:
-        """One message at a time; the next one is chosen when there is room for it."""
+        """Send one message at a time; the next one is chosen when there is room for it."""
         with suppress(Exception):
             while True:
                 wake.clear()
@@ -298,7 +298,7 @@ class Hub:
                     return
 
     async def _receive(self, ws: WebSocket, hear: Hear, bucket: Bucket) -> None:
-        """Messages of a page, as long as they make sense and are not too many."""
+        """Receive messages of a page, as long as they make sense and are not too many."""
         while (text := await heard(ws)) is not None:
             try:
                 if isinstance(text, bytes):

@@ -141,7 +141,7 @@ def kind_of(data: bytes) -> str:
 
 
 def header_of(data: bytes) -> dict[str, str]:
-    """The elements of a header as they stand, of a message that may be broken."""
+    """Return the elements of a header as they stand, of a message that may be broken."""
     start = data[:1024]
     found = {}
     for name in _HEADER:

@@ -92,7 +92,7 @@ class LogRequests:
 
 
 def _given(request: Request) -> dict[str, Any]:
-    """A filter out of the address."""
+    """Return a filter out of the address."""
     asked = request.query_params
     given: dict[str, Any] = {key: asked[key] for key in WORDS if key in asked}
     since = asked.get("since", "0")
@@ -102,7 +102,7 @@ def _given(request: Request) -> dict[str, Any]:
 
 
 def whole(entry: Entry) -> dict[str, Any]:
-    """An exchange with all that can be said about it."""
+    """Return an exchange with all that can be said about it."""
     request, problems = laid_out(entry.data)
     return {
         "n": entry.number,
@@ -123,7 +123,7 @@ def whole(entry: Entry) -> dict[str, Any]:
 
 
 def laid_out(data: bytes) -> tuple[str, list[dict[str, Any]]]:
-    """A message with a line for each element, and its mistakes by line and column of that.
+    """Return a message with a line for each element, and its mistakes by line and column of that.
 
     What cannot be laid out without a change to what is wrong with it is shown as it came.
     """
@@ -139,7 +139,7 @@ def laid_out(data: bytes) -> tuple[str, list[dict[str, Any]]]:
 
 
 def _indented(text: str) -> str | None:
-    """One line of XML as several; None if its elements do not close in order."""
+    """Return one line of XML as several; None if its elements do not close in order."""
     lines = [""]
     depth = 0
     for token in _TOKEN.findall(text):
@@ -159,7 +159,7 @@ def _indented(text: str) -> str | None:
 
 
 def archive(entries: Iterable[Entry], names: dict[str, str]) -> bytes:
-    """Messages as files of an archive, and a table of them.
+    """Return messages as files of an archive, and a table of them.
 
     Below `messages/` stands what is valid, so that `dva-sim check messages/*` finds no fault;
     below `refused/` everything else, as received.

@@ -172,7 +172,7 @@ class KeptLog:
         return (entry for n in numbers if (entry := self.entries.get(n)) is not None)
 
     def find(self, wanted: LogFilter, names: Names, before: int | None, most: int) -> list[Entry]:
-        """The newest entries that match, below a number; the oldest first."""
+        """Return the newest entries that match, below a number; the oldest first."""
         found = (
             entry
             for entry in reversed(self.entries.values())
@@ -197,7 +197,7 @@ class KeptLogs:
         return name in self._logs
 
     def of(self, name: str) -> KeptLog:
-        """A log by its name, empty if nothing was told of it."""
+        """Return a log by its name, empty if nothing was told of it."""
         if name not in self._logs and len(self._logs) >= MOST_KNOWN:
             del self._logs[next(iter(self._logs))]
         return self._logs.setdefault(name, KeptLog(name))
@@ -209,7 +209,7 @@ class KeptLogs:
             del self.names[next(iter(self.names))]
 
     def take(self, line: Line) -> None:
-        """A line of the kind `log`."""
+        """Take a line of the kind `log`."""
         entries = [Entry.of(one) for one in line["lines"]]
         for entry in entries:
             if entry.kind == "RegMsg" and entry.code == m.OK:
@@ -250,7 +250,7 @@ class Looks:
         self._seen: dict[str, tuple[int, int, int]] = {}  # changes, lost, begun
 
     def look(self, logs: Any, tables: Any) -> None:
-        """From now on the page looks at these.
+        """Select the logs that the page looks at from now on.
 
         Raises:
             BadMessage: it makes no sense.

@@ -49,7 +49,7 @@ class RemoteCamera:
     boundary: bytes
 
     async def pictures(self) -> AsyncGenerator[bytes, None]:
-        """Pictures as parts of a response, until the other end is silent or ends."""
+        """Yield pictures as parts of a response, until the other end is silent or ends."""
         try:
             yield f"--{BOUNDARY}\r\n".encode()
             buffer = b""

@@ -28,7 +28,7 @@ PROGRAM = "program"  # with its role: the client of a request without a key
 
 
 def state_of(state: RunState, clients: int) -> dict[str, Any]:
-    """The newest of everything, with units in the names."""
+    """Return the newest of everything, with units in the names."""
     rows = state.lines.get("rows", {})
     values = {row["i"]: row for row in rows.get("robots", ())}
     doing = {row["i"]: row for row in rows.get("people", ())}
@@ -160,7 +160,7 @@ class Rest:
             return problem(400, str(error))
 
     def _robots_of(self, body: dict[str, Any]) -> dict[str, Any]:
-        """The robots to stop: those that are known of a list, and all if none of it is."""
+        """Return the robots to stop: those that are known of a list, and all if none of it is."""
         named = body.get("robots", "all")
         labels = self._simulation.labels
         if not isinstance(named, list):
@@ -174,7 +174,7 @@ class Rest:
         return {"robots": known or "all"}
 
     def _client(self, body: dict[str, Any], role: Role) -> str:
-        """The name of the page or program that asks.
+        """Return the name of the page or program that asks.
 
         Raises:
             NotAllowed: it shows no key that belongs to a seat of its role.
@@ -191,7 +191,7 @@ class Rest:
         return _program(role)
 
     async def _do_in_new_seat(self, asked: Answer, key: str, role: Role) -> Response:
-        """A program sits down: the answer has the key for its later requests."""
+        """Let a program sit down; the answer has the key for its later requests."""
         program = self._hub.new_program(role)
         if program is None:
             return problem(503, "too many programs have a seat")
@@ -218,7 +218,7 @@ def _program(role: Role) -> str:
 
 
 async def body_of_request(request: Request) -> dict[str, Any]:
-    """The JSON object in a body that is not too long.
+    """Return the JSON object in a body that is not too long.
 
     Raises:
         BadMessage: it is something else.
@@ -264,5 +264,5 @@ class TooStrange(Exception):
 
 
 def problem(status: int, text: str) -> Response:
-    """An answer that says in one line why nothing was done."""
+    """Return an answer that says in one line why nothing was done."""
     return JSONResponse({"ok": False, "text": text}, status, headers=NOT_KEPT)

@@ -72,7 +72,7 @@ class OutgoingLines:
         return True
 
     def next(self) -> bytes | None:
-        """The next line to write, with its end; None if there is nothing to say."""
+        """Return the next line to write, with its end; None if there is nothing to say."""
         if self._urgent:
             asked = self._urgent.popleft()
         elif self._actions:

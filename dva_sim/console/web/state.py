@@ -36,12 +36,12 @@ class Versioned(NamedTuple):
 
 
 def encode(line: Mapping[str, Any]) -> str:
-    """A line as compact JSON."""
+    """Return a line as compact JSON."""
     return json.dumps(line, separators=(",", ":"))
 
 
 def body_of(line: Mapping[str, Any]) -> str:
-    """A line as JSON without its first brace, so that a number can be put before it."""
+    """Return a line as JSON without its first brace, so that a number can be put before it."""
     return encode(line)[1:]
 
 

@@ -27,7 +27,7 @@ GRACE: Final = 5.0  # the web process has answered before a page gives up [s]
 
 
 def javascript() -> str:
-    """Constants of the pages."""
+    """Return constants of the pages."""
     patience = {
         name: round(1000 * (one.patience + GRACE))
         for name, one in ACTIONS.items()
@@ -46,7 +46,7 @@ def javascript() -> str:
 
 
 def line_types() -> str:
-    """Types of all lines sent to pages, of audit log replies, and of their parts."""
+    """Return types of all lines sent to pages, of audit log replies, and of their parts."""
     found: dict[type, str] = {}
     for one in (*get_args(ToPage), AuditRow, AuditCheck, AuditMeasures):
         _declare(one, found)
@@ -88,7 +88,7 @@ _PLAIN: Final = {int: "number", float: "number", str: "string", bool: "boolean",
 
 
 def _in_javascript(hint: Any, found: dict[type, str]) -> str:
-    """A type as pages write it."""
+    """Return a type as pages write it."""
     if hint in _PLAIN:
         return _PLAIN[hint]
     if hint in (None, type(None)):

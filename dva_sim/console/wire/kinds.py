@@ -137,7 +137,7 @@ _UNIONS = (Union, type(int | str))
 
 
 def _inner(hint: Any) -> Any:
-    """The annotation of the elements of a list."""
+    """Return the annotation of the elements of a list."""
     if get_origin(hint) is Annotated or get_origin(hint) in _UNIONS:
         return _inner(get_args(hint)[0])
     return get_args(hint)[0] if get_origin(hint) is list else hint
@@ -145,7 +145,7 @@ def _inner(hint: Any) -> Any:
 
 @cache
 def hints_of(arguments: type) -> dict[str, Any]:
-    """The annotations of a class of arguments, by their names."""
+    """Return the annotations of a class of arguments, by their names."""
     hints = get_type_hints(arguments, include_extras=True).items()
     return {key: get_args(h)[0] if get_origin(h) is NotRequired else h for key, h in hints}
 

@@ -110,7 +110,7 @@ class KeptResults:
         world.clock.pulse(LOOK, self._look)
 
     def _label_of(self, id_tag: str) -> str:
-        """The label of a device, unless a person may have given it."""
+        """Return the label of a device, unless a person may have given it."""
         assert self._world is not None
         if id_tag in self._rooms:
             return f"person-{self._rooms[id_tag]}"
@@ -194,6 +194,6 @@ PEOPLES = ("console", "control-room", "phone")  # kinds of devices that people n
 
 
 def name_of(id_tag: str) -> str:
-    """A device by its kind and number, whatever its owner calls it."""
+    """Return a device by its kind and number, whatever its owner calls it."""
     kind, number = kind_of(id_tag)
     return f"{kind}-{number}"

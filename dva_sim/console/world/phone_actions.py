@@ -57,13 +57,13 @@ class PhoneActions:
         return phone is not None and phone.tilts
 
     def let_go(self, client: str) -> None:
-        """The stick on a phone's screen is let go, if it is a phone."""
+        """Let go of the stick on a phone's screen, if it is a phone."""
         phone = self._phones.by_client.get(client)
         if phone is not None:
             phone.tilt.let_go()
 
     def samples(self, client: str, line: SampleBatch) -> None:
-        """Samples of a phone have come."""
+        """Take samples of a phone."""
         batch = samples_of(line)
         phone = self._phones.seat(client)
         if phone is None:
@@ -80,13 +80,13 @@ class PhoneActions:
             self._seats.heard(client, now, batch.hand)
 
     def leaves(self, client: str) -> None:
-        """A page has left its seat of the console: another one there steers as it likes."""
+        """Note that a page has left its seat: another one there steers as it likes."""
         phone = self._phones.by_client.get(client)
         if phone is not None:
             phone.lend(None)
 
     def forget(self, client: str) -> None:
-        """Its page is gone for good: the device leaves."""
+        """Let the device of a page that has gone for good leave."""
         phone = self._phones.by_client.pop(client, None)
         if phone is not None:
             self._retire(client, phone)

@@ -39,7 +39,7 @@ class FreeWay(NamedTuple):
 
 
 def tour_of(run: Run, numbers: Mapping[str, int]) -> TourPlan | None:
-    """Two robots and their goals, from where they stand now; None: no two have such a way.
+    """Return two robots and their goals, from where they stand now; None: no two have such a way.
 
     Args:
         numbers: Numbers of the robots, by id.

@@ -59,7 +59,7 @@ def _cost(situation: Situation, task: int) -> Floats:
 
 
 def _announce(situation: Situation, free: Free) -> list[Announcement]:
-    """The oldest task that has not been announced and that somebody free could do."""
+    """Return the oldest task that has not been announced and that somebody free could do."""
     if any(task.auction == "open" for task in situation.tasks):
         return []
     for place in waiting(situation):

@@ -56,7 +56,7 @@ class Coverage(Policy):
         return [*chosen, *self._moves(situation.cover, guards)]
 
     def _moves(self, cover: Cover, guards: Sequence[int]) -> list[Relocation]:
-        """The best move, then the best of those that are left, while one pays."""
+        """Return the best move, then the best of those that are left, while one pays."""
         bound_for = dict(enumerate(cover.bound_for))
         response = self._response(cover, guards, bound_for)
         staying = [row for row, guard in enumerate(guards) if bound_for.get(guard) is None]
@@ -75,7 +75,7 @@ class Coverage(Policy):
     def _response(
         self, cover: Cover, guards: Sequence[int], bound_for: Mapping[int, int | None]
     ) -> Floats:
-        """From each guard to each zone [s], shape `(guards, zones)`: by way of a station."""
+        """Return times from each guard to each zone by way of a station [s], `(guards, zones)`."""
         way = cover.eta[list(guards)]
         way = np.where(way <= self.there_s, 0.0, way)
         for row, guard in enumerate(guards):
@@ -88,7 +88,7 @@ class Coverage(Policy):
 
 
 def _gains(response: Floats, movers: Sequence[int], cover: Cover) -> Floats:
-    """By how much each move lowers the expected response [s], shape `(movers, stations)`."""
+    """Return by how much each move lowers the expected response [s], `(movers, stations)`."""
     reach = np.minimum(cover.reach, _UNREACHED)
     now = response.min(axis=0) @ cover.demand
     gains = np.empty((len(movers), len(reach)))

@@ -27,7 +27,7 @@ class Free:
         self._bar_robots()
 
     def best(self, cost: Floats) -> int | None:
-        """The place of the cheapest, the first of equals; None if nobody is left who can.
+        """Return the place of the cheapest, the first of equals; None if nobody is left who can.
 
         Args:
             cost: Cost of each responder, shape `(responders,)`; infinite means never.
@@ -39,7 +39,7 @@ class Free:
         return best if total[best] < np.inf else None
 
     def able(self, cost: Floats) -> NDArray[np.intp]:
-        """Places of all who are left and can."""
+        """Return places of all who are left and can."""
         return np.flatnonzero(cost + self._barred < np.inf)
 
     def take(self, responder: int) -> None:

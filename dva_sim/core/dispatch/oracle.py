@@ -57,7 +57,7 @@ class OraclePlan:
 
 
 def solve(instance: Instance) -> OraclePlan:
-    """The plan with the least sum of response times, exactly.
+    """Return the plan with the least sum of response times, exactly.
 
     A plan is an order of events for each unit, in which it is sent as soon as the event is
     known and it is free; it may wait for an event to come while another one is open. Branch and
@@ -130,7 +130,7 @@ class _Search:
         return sorted(found)
 
     def _bound(self, left: tuple[int, ...], free: tuple[float, ...], last: float) -> float:
-        """No way to serve the rest has a smaller sum of response times than this.
+        """Return a bound: no way to serve the rest has a smaller sum of response times.
 
         The p-th event of a unit's tour cannot be served before the unit has done p others, which
         takes no less than the p quickest of all that are left. The best assignment of events
@@ -195,7 +195,7 @@ class OraclePolicy(Policy):
         return chosen
 
     def _next(self, tour: Sequence[int], tasks: dict[int, int], now: float) -> int | None:
-        """The first open event of a tour, unless an earlier one has yet to come."""
+        """Return the first open event of a tour, unless an earlier one has yet to come."""
         for event in tour:
             if event in tasks:
                 return event

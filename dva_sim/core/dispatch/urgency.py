@@ -91,7 +91,7 @@ class Preemptive(Policy):
 
 
 def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
-    """Places of the tasks that wait; those of one urgency in the order they came."""
+    """Return places of the tasks that wait; those of one urgency in the order they came."""
 
     def urgency(place: int) -> float:
         task = situation.tasks[place]
@@ -101,7 +101,7 @@ def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
 
 
 def _left_behind(situation: Situation) -> Floats:
-    """Severity of what each responder is under way to; infinite for who is idle."""
+    """Return the severity of what each responder is under way to; infinite for who is idle."""
     tasks = situation.tasks
     under_way = (r.engaged for r in situation.responders)
     return np.array([np.inf if task is None else tasks[task].severity for task in under_way])

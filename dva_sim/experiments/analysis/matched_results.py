@@ -260,7 +260,7 @@ class GateGroup:
     pairs: tuple[Pair, ...]
 
     def cells(self, side: int) -> dict[int, int]:
-        """The cells of the first (0) or second (1) folder, with their numbers in the first."""
+        """Return the cells of the first (0) or second (1) folder, numbered as in the first."""
         return {(pair.first, pair.second)[side]: pair.first for pair in self.pairs}
 
 

@@ -129,7 +129,7 @@ class RunGrid:
         return values
 
     def excess(self, column: str) -> Floats:
-        """The grid of a column in excess of the reference run of the same person and trial."""
+        """Return the grid of a column less the reference run of the same person and trial."""
         return np.asarray(self.grid(column) - self.reference(column))
 
     def outcome(self, column: str) -> Floats:

@@ -319,7 +319,7 @@ def _plan(test: _Test) -> SizePlan:
 
 
 def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
-    """The fewest persons with such a chance, and how far the spread of a few leaves it open."""
+    """Return the fewest persons with such a chance, and how far a few leave it open."""
     persons = _fewest(chance, wanted)
     freedom = known - 1
     # The sum of squares over the true variance is chi-squared; persons go with the variance.

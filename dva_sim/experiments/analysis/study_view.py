@@ -126,7 +126,7 @@ class StudyView:
         return self.part.outcome(self.measure)
 
     def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
-        """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
+        """Return the stops of a panel at which a line, of some or all, is an extrapolation."""
         if self.outside is None:
             return []
         some = self.lines if lines is None else lines

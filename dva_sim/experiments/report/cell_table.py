@@ -168,7 +168,7 @@ _ENDINGS = {
 
 
 def _endings(part: RunGrid) -> Iterator[_Column]:
-    """The share confirmed, and how the last drives of the others ended, as far as it occurs."""
+    """Yield the share confirmed, and how the last drives of the others ended."""
     if not part.has("confirmed"):
         return
     grid = part.grid("confirmed")

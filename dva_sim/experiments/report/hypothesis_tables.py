@@ -69,7 +69,7 @@ def _are_few(found: Interval, smallest: float | None, tests: int = 1) -> bool:
 
 
 def _least_p(persons: int, tests: int) -> float:
-    """The least p that a permutation test can give by Holm, as the first of a family of tests."""
+    """Return the least p that a permutation test can give by Holm, first of a family."""
     return min(1.0, tests * 2.0 ** (1 - persons))
 
 

@@ -88,7 +88,7 @@ class PeoplePage(ModelPage):
         return self._drives[name].tolist() if self._drives else []
 
     def cells(self, part: RunGrid) -> CellTable | None:
-        """The drives by person, robot, pattern and link, in the order in which they began."""
+        """Return the drives by person, robot, pattern and link, in the order of their starts."""
         columns = [self._drives[key].tolist() for key in _KEYS if key in self._drives]
         keys = [tuple(map(str, key)) for key in zip(*columns, strict=True)]
         rows = []

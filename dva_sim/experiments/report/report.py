@@ -189,7 +189,7 @@ def _endings(reading: Reading) -> Iterator[Block]:
 
 
 def _found(reading: Reading) -> Iterator[Block]:
-    """The answer level by level, what else was found, and what other models of persons say."""
+    """Yield the answer level by level, further results, and what other models of persons say."""
     if reading.map is not None and reading.view is not None:
         yield Heading("The map")
         part = reading.view.part.name

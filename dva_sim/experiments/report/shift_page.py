@@ -193,7 +193,7 @@ def _notes(shifts: Shifts) -> list[str]:
 
 
 def _quickest(shifts: Shifts, stop: int) -> tuple[str, float, list[str]]:
-    """The policy with the least mean response at a load, that response, and those not slower."""
+    """Return the policy of the least mean response at a load, that response, and its equals."""
     response = shifts.means("response_mean_s")
     candidates = [i for i, p in enumerate(shifts.policies) if p != BEST]
     best = min(candidates, key=lambda i: response[i, stop])

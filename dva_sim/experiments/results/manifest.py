@@ -146,7 +146,7 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
 
 
 def _judged_again(status: Status) -> Status:
-    """The status, with a word if hypotheses are judged by another program than was registered."""
+    """Return the status, with a word if another program judges than was registered."""
     meant = (status.registration or {}).get("judged_with")
     if not meant or meant == (now := fingerprint_of_judges()):
         return status

@@ -50,7 +50,7 @@ Changes = dict[str, Any]
 
 
 def says(*keys: str, not_: str = "") -> dict[str, Any]:
-    """The JSON Schema of a mapping with something under these keys, and nothing under another."""
+    """Return the JSON Schema of a mapping with values under these keys and no others."""
     rules: dict[str, Any] = {key: {"not": {"type": "null"}} for key in keys}
     return {
         "required": list(keys),

@@ -125,7 +125,7 @@ class Study(Config):
     @field_validator("parts", "comparisons")
     @classmethod
     def _leaves_room(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        """The repeats are called as if they were a part, the answer as if it were a comparison."""
+        """Return it with names free for repeats, called as a part, and the answer."""
         of_parts = ("a part", REPEATS, "the repeats are")
         of_comparisons = ("a comparison", ANSWER, "the declared contrast is")
         what, taken, by = of_parts if info.field_name == "parts" else of_comparisons
@@ -207,7 +207,7 @@ class Study(Config):
         return self._status
 
     def error(self, problem: str, path: KeyPath) -> ConfigError:
-        """A mistake at what `--set` gives, at a key of the study's file, or in that of its rows."""
+        """Return a mistake at what `--set` gives, at a key of the file, or in that of its rows."""
         if pair := self.setting_of(path):
             return ConfigError(f"--set {pair}: {problem}")
         if self._table is not None and path[:2] == ("design", ROWS):
@@ -226,7 +226,7 @@ class Study(Config):
         return None
 
     def is_from_file(self, path: KeyPath) -> bool:
-        """True if the value at `path` comes from the study's file rather than from `--set`."""
+        """Return True if the value at `path` is of the study's file rather than of `--set`."""
         if self._table is not None and path[:2] == ("design", ROWS):
             return path[1:] in self._table.places
         return path in self._document.places

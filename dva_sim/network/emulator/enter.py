@@ -27,7 +27,7 @@ _BY_SIGNAL = 128  # exit codes of programs that a signal has ended, as shells gi
 
 
 def words_of(user_space: int | None, network: int, program: list[str]) -> list[str]:
-    """The command line that runs a program in namespaces, given by their open files."""
+    """Return the command line that runs a program in namespaces, given by their open files."""
     user = _NONE if user_space is None else str(user_space)
     parent = str(os.getpid())
     numbers = [str(os.getuid()), str(os.getgid())]

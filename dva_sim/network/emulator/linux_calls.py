@@ -212,7 +212,7 @@ FAR_END = End("10.77.0.2", "10.77.0.1")
 
 
 def open_tun(end: End, congestion: str) -> int:
-    """A TUN device of this namespace, up, with a route to the other end.
+    """Return a TUN device of this namespace, up, with a route to the other end.
 
     Args:
         end: Addresses.
@@ -265,7 +265,7 @@ class DroppedPackets:
 
 
 def _address(text: str) -> bytes:
-    """An `ifreq` with an IPv4 address."""
+    """Return an `ifreq` with an IPv4 address."""
     return struct.pack("16sHH4s16x", _NAME, socket.AF_INET, 0, socket.inet_aton(text))
 
 
@@ -290,7 +290,7 @@ def _add_route(peer: str, index: int, congestion: str) -> None:
 
 
 def _attribute(kind: int, value: bytes) -> bytes:
-    """A netlink attribute, padded to four bytes."""
+    """Return a netlink attribute, padded to four bytes."""
     return struct.pack("HH", 4 + len(value), kind) + value + b"\0" * (-len(value) % 4)
 
 

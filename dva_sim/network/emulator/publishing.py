@@ -21,7 +21,7 @@ BROKEN = OSError, asyncio.IncompleteReadError, asyncio.CancelledError
 
 
 def words_of(listeners: Sequence[socket.socket]) -> list[str]:
-    """The command line of the process that passes on what these sockets accept."""
+    """Return the command line of the process that passes on what these sockets accept."""
     ports = [f"{listener.fileno()}:{listener.getsockname()[1]}" for listener in listeners]
     # -P: a file of the user that is called like a module of Python is not imported.
     return [sys.executable, "-P", "-m", __name__, *ports]

@@ -127,12 +127,12 @@ class LinkReport:
         return self.late_p99_s > LATE_S or self.overrun_packets > 0
 
     def to_json(self) -> str:
-        """One line."""
+        """Return one line."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> LinkReport:
-        """The report of such a line."""
+        """Return the report of such a line."""
         data: dict[str, Any] = json.loads(text)
         up, down = (DirectionReport(**data.pop(way)) for way in ("up", "down"))
         return cls(up, down, **data)

@@ -52,7 +52,7 @@ def main(parent: int, control: int) -> None:
 
 
 def _make_end(end: End) -> tuple[int, int, DroppedPackets]:
-    """The device of a new network namespace, the namespace, and what is dropped there."""
+    """Return the device of a new network namespace, the namespace, and what is dropped there."""
     enter_network_namespace()
     raise_loopback()
     tun = open_tun(end, "cubic")

@@ -46,14 +46,14 @@ class ConstantDelay(Config):
     law: Literal["constant"]
 
     def check(self, delay: float) -> None:
-        """Any delay will do."""
+        """Accept any delay."""
 
     def moments(self, delay: float) -> tuple[float, float]:
         """Implement `_Law`."""
         return delay, 0.0
 
     def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> None:
-        """No deviation; see `_Law`."""
+        """Return no deviation; see `_Law`."""
 
 
 class _Law(Config):
@@ -81,10 +81,10 @@ class _Law(Config):
 
     @abstractmethod
     def quantile(self, delay: float) -> Quantile:
-        """Deviations from `delay_s` [s] by probability."""
+        """Return deviations from `delay_s` [s] by probability."""
 
     def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> Wobble:
-        """Deviations from `delay_s` [s], from the random stream of that name.
+        """Return deviations from `delay_s` [s], from the random stream of that name.
 
         Args:
             delay: The link's `delay_s` [s].
@@ -212,7 +212,7 @@ def _above_least(least: float, delay: float) -> None:
 
 
 def _constant_by_name(value: Any) -> Any:
-    """The one law without keys of its own needs no mapping."""
+    """Return the one law without keys of its own needs no mapping."""
     if isinstance(value, str) and value != "constant":
         raise ValueError("a law is a mapping, such as {law: gamma, sd_s: 0.02}, or constant")
     return {"law": value} if isinstance(value, str) else value

@@ -18,7 +18,7 @@ _OF_SCENARIOS = {"horizon_s", "model"}  # each has one of these
 
 
 def read_link(name: str | None, changes: Mapping[str, Any], nodes: Collection[str]) -> LinkConfig:
-    """A link from a file, with some keys changed.
+    """Return a link from a file, with some keys changed.
 
     Args:
         name: Path of a file of a link's keys, or of a scenario, or name of a scenario; None: the
@@ -44,7 +44,7 @@ def read_link(name: str | None, changes: Mapping[str, Any], nodes: Collection[st
 
 
 def _link_in(document: Document) -> Document:
-    """The part of a file that holds the keys of a link."""
+    """Return the part of a file that holds the keys of a link."""
     if _KEY not in document.data and not _OF_SCENARIOS & document.data.keys():
         return document
     data = document.data.get(_KEY, {})

@@ -180,7 +180,7 @@ class Link:
         return left_at + self._base
 
     def backlog_bytes(self, now: float) -> float:
-        """Bytes that wait before the link at `now` [B]."""
+        """Return bytes that wait before the link at `now` [B]."""
         return self._serialiser.backlog_bytes(now)
 
     def has_room(self, now: float, size: int) -> bool:
@@ -214,7 +214,7 @@ def make_serialiser(
 def _make_fates(
     way: LinkConfig, replay: Replay | None, streams: Streams, name: str, make: MakeNumbers
 ) -> tuple[Fate, ...]:
-    """All chances that may take a packet of one direction."""
+    """Return all chances that may take a packet of one direction."""
     fates: list[Fate] = [replay.takes] if replay else []
     if way.loss:
         uniforms = make(streams, f"{name}/loss")
@@ -236,7 +236,7 @@ def _make_wobble(way: LinkConfig, streams: Streams, name: str, make: MakeNumbers
 def _make_replay(
     way: LinkConfig, direction: Direction, streams: Streams, name: str
 ) -> Replay | None:
-    """One direction's part of a delay log; both directions play the same moment of it.
+    """Return one direction's part of a delay log; both directions play the same moment of it.
 
     A lost round trip is lost in one direction only, chosen at random.
     """
@@ -442,7 +442,7 @@ def make_link(
     reception: Callable[[], Reception | None] | None = None,
     by_packet: bool = False,
 ) -> Link:
-    """The `up` or `down` direction of a configured link.
+    """Return the `up` or `down` direction of a configured link.
 
     Args:
         direction: `up` or `down`.

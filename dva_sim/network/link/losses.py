@@ -78,19 +78,19 @@ class Bursts(Config):
 
 
 def chance(loss: float, uniforms: UniformNumbers) -> Fate:
-    """Independent losses with a fixed probability; one random number per packet."""
+    """Return the independent losses with a fixed probability; one random number per packet."""
     return lambda now, left_at: uniforms.draw(now) < loss
 
 
 def timed_bursts(spells: Spells, loss: float, uniforms: UniformNumbers) -> Fate:
-    """Losses of packets sent in bad times, with the probability then."""
+    """Return losses of packets sent in bad times, with the probability then."""
     return lambda now, left_at: spells.is_on(now) and uniforms.draw(now) < loss
 
 
 def counted_bursts(
     rng: np.random.Generator, share: float, length: float, loss: float, uniforms: UniformNumbers
 ) -> Fate:
-    """Losses in bursts counted in packets, independent of their times.
+    """Return losses in bursts counted in packets, independent of their times.
 
     Args:
         rng: Random generator of the bursts.

@@ -23,7 +23,7 @@ class Serialiser(ABC):
 
     @abstractmethod
     def backlog_bytes(self, now: float) -> float:
-        """Bytes still waiting or under way onto the link at `now` [B]."""
+        """Return bytes still waiting or under way onto the link at `now` [B]."""
 
     @abstractmethod
     def depart(self, now: float, size: int) -> float:
@@ -111,7 +111,7 @@ class TraceRate(Serialiser):
         self._backlog = 0
 
     def _first_at(self, now: float) -> int:
-        """Running number of the first opportunity not before `now`."""
+        """Return the running number of the first opportunity not before `now`."""
         laps, inside = divmod(now + self._offset, self._period)
         inside -= 1e-9
         return int(laps) * len(self._times) + int(np.searchsorted(self._times, inside))

@@ -23,7 +23,7 @@ _ROUND_TRIP = re.compile(r'"rtt"\s*:\s*(\d+)')
 
 @read_once(lambda path: [file_of(path)])
 def read_trace(path: str) -> Floats:
-    """Packet opportunities [s], shape `(n,)`, of a Mahimahi trace.
+    """Return the packet opportunities [s], shape `(n,)`, of a Mahimahi trace.
 
     Raises:
         ConfigError: not readable, not whole milliseconds, not ascending, or too short.
@@ -48,13 +48,13 @@ def is_trace(path: str) -> bool:
 
 
 def longest_gap_s(times: Floats) -> float:
-    """For how long a trace carries nothing at most, over and over [s]."""
+    """Return for how long a trace carries nothing at most, over and over [s]."""
     return float(np.max(np.diff(times, prepend=0.0)))
 
 
 @read_once(lambda path: [file_of(path)])
 def read_delays(path: str) -> tuple[float, ...]:
-    """Delays [s] of a file with one a line [ms].
+    """Return delays [s] of a file with one a line [ms].
 
     Raises:
         ConfigError: not readable, not a delay, or none.
@@ -106,7 +106,7 @@ def _of_trips(content: str) -> str:
 
 
 def numbered_lines(path: str, what: str) -> Iterator[tuple[int, str]]:
-    """Number and text of each line that is not empty.
+    """Yield the number and text of each line that is not empty.
 
     Raises:
         ConfigError: not readable, or a report of iperf3, which holds throughput.

@@ -46,7 +46,7 @@ class Replay:
 
 
 def period_of(log: DelayLog) -> float:
-    """Period after which a log repeats [s]: a typical step after its last probe."""
+    """Return the period after which a log repeats [s]: a typical step after its last probe."""
     steps = np.diff(log.times)
     return float(log.times[-1] - log.times[0] + np.median(steps[steps > 0]))
 
@@ -57,7 +57,7 @@ def moments_of(log: DelayLog) -> tuple[float, float]:
 
 
 def _filled(delays: Floats) -> Floats:
-    """With the last known delay where a probe was lost."""
+    """Return delays with the last known one where a probe was lost."""
     known = np.flatnonzero(~np.isnan(delays))
     last = np.searchsorted(known, np.arange(len(delays)), side="right") - 1
     return delays[known[np.maximum(last, 0)]]

@@ -28,7 +28,7 @@ class UniformNumbers(Protocol):
     """A source of uniform numbers, one for each packet."""
 
     def draw(self, now: float) -> float:
-        """A number in [0, 1) for a packet sent at `now` [s]."""
+        """Return a number in [0, 1) for a packet sent at `now` [s]."""
 
 
 MakeNumbers = Callable[[Streams, str], UniformNumbers]
@@ -96,7 +96,7 @@ class PacketNumbers:
 
 
 def _scrambled(seed: float, count: int) -> float:
-    """The `count`-th of independent uniform numbers that follow from one.
+    """Return the `count`-th of independent uniform numbers that follow from one.
 
     References:
         Steele, Lea, Flood: Fast splittable pseudorandom number generators. OOPSLA 2014: a
@@ -176,7 +176,7 @@ class Spells:
 
 
 def _lengths(rng: np.random.Generator, first: float, second: float) -> Iterator[float]:
-    """Exponential lengths of two means by turns, without end."""
+    """Yield the exponential lengths of two means by turns, without end."""
     while True:
         yield from (rng.standard_exponential((128, 2)) * (first, second)).ravel().tolist()
 

@@ -44,7 +44,7 @@ class Rendezvous:
     ready_by: float
 
     def address(self, side: Side) -> str:
-        """IPv4 address of one side."""
+        """Return IPv4 address of one side."""
         return self.near if side == "near" else self.far
 
 
@@ -75,7 +75,7 @@ E = TypeVar("E", bound=TransportEnd)
 
 
 def connected(end: E, connect: Callable[[], object]) -> E:
-    """The end once it is connected; one that cannot be is closed."""
+    """Return the end once it is connected; one that cannot be is closed."""
     try:
         connect()
     except BaseException:
@@ -104,7 +104,7 @@ class CommandTransport(ABC):
     carries_pictures: bool = True
 
     def lacks(self) -> str:
-        """One line that says what is not installed here; empty if nothing is missing."""
+        """Return one line that says what is not installed here; empty if nothing is missing."""
         if self.library and find_spec(self.library) is None:
             how = f": pip install -e '.[{self.extra}]'" if self.extra else ""
             return f"{self.title or type(self).__name__} needs {self.library}{how}"

@@ -118,7 +118,7 @@ class ZeroMqTransport(CommandTransport):
         return _Sockets(self, place, receive, is_near=False)
 
     def opened(self, context: zmq.Context[Socket], kind: int) -> Socket:
-        """A socket with these options."""
+        """Return a socket with these options."""
         conflates = self.pattern == "conflate" and kind in (zmq.PUB, zmq.SUB)
         return plain_socket(context, kind, self.high_water_mark, conflates)
 

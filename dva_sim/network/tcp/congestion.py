@@ -35,7 +35,7 @@ class Reno:
         self.threshold = inf
 
     def grow(self, segments: int, now: float, ahead: float) -> None:
-        """Segments have been delivered while the window was in use.
+        """Grow by segments that have been delivered while the window was in use.
 
         Args:
             segments: Number of segments.
@@ -56,10 +56,10 @@ class Reno:
         return self.threshold
 
     def rests(self, now: float) -> None:
-        """An acknowledgement while the window was not in use."""
+        """Note an acknowledgement while the window was not in use."""
 
     def after_idle(self, idle: float, timeout: float) -> None:
-        """Nothing was sent for `idle` [s]: halve for each `timeout` [s] of it."""
+        """Halve for each `timeout` [s] of the `idle` time [s] in which nothing was sent."""
         floor = min(self._start, self.window)
         self.threshold = max(self.threshold, 0.75 * self.window)
         while idle > timeout and self.window > floor:
@@ -109,7 +109,7 @@ class Cubic(Reno):
         self._last = now
 
     def curve(self, elapsed: float) -> float:
-        """W_cubic, `elapsed` [s] after the epoch's start [segments]: RFC 9438, figure 1."""
+        """Return W_cubic, `elapsed` [s] after the epoch's start [segments]: RFC 9438, figure 1."""
         return self._plateau + int(self.C * (elapsed - self._inflection) ** 3)
 
     def _avoid(self, segments: int, now: float, ahead: float) -> None:
@@ -134,7 +134,7 @@ class Cubic(Reno):
         return max(2, int(self.window / (target - self.window)))
 
     def _begin(self, now: float) -> None:
-        """A new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
+        """Begin a new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
         self._epoch = now
         self._estimate = self.window
         self._plateau = max(self._peak, self.window)
@@ -196,15 +196,15 @@ class Unlimited(Reno):
         self.window = 1e9
 
     def grow(self, segments: int, now: float, ahead: float) -> None:
-        """Nothing to grow."""
+        """Do nothing: there is nothing to grow."""
 
     def reduce(self, now: float) -> float:
-        """Nothing to reduce."""
+        """Return the window: there is nothing to reduce."""
         return self.window
 
 
 def make_window(options: TcpOptions) -> Reno:
-    """The congestion window that the options ask for."""
+    """Return the congestion window that the options ask for."""
     if not options.congestion_window:
         return Unlimited(options)
     return Cubic(options) if options.congestion == "cubic" else Reno(options)
@@ -227,7 +227,7 @@ class RateReduction:
         self._delivered = self.sent = 0
 
     def allows(self, delivered: int, in_flight: int, advanced: bool) -> int:
-        """Segments that may leave now.
+        """Return segments that may leave now.
 
         Args:
             delivered: Segments newly acknowledged, selectively or not.

@@ -118,7 +118,7 @@ class TcpConnection:
             self._answer(stamp)
 
     def _answer(self, stamp: float = 0.0) -> None:
-        """The peer's answer to an opening segment, with the time stamp it echoes."""
+        """Send the peer's answer to an opening segment, with the time stamp it echoes."""
         if self.peer.gone or self._answered > SYNACK_RETRIES + self._asked:
             return
         stamp = stamp or self._asked_at
@@ -144,7 +144,7 @@ class TcpConnection:
             self._then()
 
     def _accept(self) -> None:
-        """The first segment after the answer makes the peer established too."""
+        """Accept the first segment after the answer, which makes the peer established too."""
         self._answering.stop()
         once = self._answered == 1
         rtt = self._clock.now - self._answered_at if once else None

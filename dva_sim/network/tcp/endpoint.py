@@ -101,7 +101,7 @@ class TcpEndpoint:
         return self._receiver.read(min(count, self.readable))
 
     def finish(self) -> None:
-        """The program closes its socket: what is written is still delivered, then the end.
+        """Close the program's socket: what is written is still delivered, then the end.
 
         Later segments are discarded and answered by a reset (`on_end` at the other end).
         """
@@ -124,7 +124,7 @@ class TcpEndpoint:
         self._receiver.stop()
 
     def reset(self) -> None:
-        """The connection has broken."""
+        """Reset a connection that has broken."""
         if not self.gone:
             self._forget()
             self._tell_end()
@@ -141,7 +141,7 @@ class TcpEndpoint:
         echo: float,
         pushes: bool,
     ) -> None:
-        """A segment arrives; its arguments are what `Sender` and `Receiver` name so."""
+        """Take a segment; its arguments are what `Sender` and `Receiver` name so."""
         if self._deaf:
             return
         if not (self.established or self.gone):

@@ -38,7 +38,7 @@ class OrderedMessages:
         reader.on_readable = self._take
 
     def open(self) -> None:
-        """From now on the connection takes what is written."""
+        """Let the connection take what is written from now on."""
         self._is_open = True
         self._write()
 

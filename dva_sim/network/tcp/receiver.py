@@ -78,7 +78,7 @@ class Receiver:
         self._timer = Timer(clock, self._waited, options.tick)
 
     def take(self, start: int, end: int, now: float, pushes: bool) -> bool:
-        """Bytes `start` to `end` arrive at `now` [s]; returns whether some are in order."""
+        """Return bytes `start` to `end` arrive at `now` [s]; returns whether some are in order."""
         if end <= self.next:
             self.duplicate = True
             self._hurry()
@@ -106,7 +106,7 @@ class Receiver:
         return True
 
     def read(self, count: int) -> int:
-        """The program takes up to `count` bytes [B]; returns how many there were."""
+        """Take up to `count` bytes [B] for the program; return how many there were."""
         taken = min(count, self.next - self.read_to)
         self.read_to += taken
         if self._automatic:
@@ -135,7 +135,7 @@ class Receiver:
             self._timer.set(at)
 
     def leaves(self, now: float, data: bool) -> None:
-        """A segment leaves, and the acknowledgement with it."""
+        """Note that a segment leaves, and the acknowledgement with it."""
         if data and now - self._last_data < self._patience:
             self.dialogue = True
         if self.pending and self._quick:
@@ -153,7 +153,7 @@ class Receiver:
         self._timer.stop()
 
     def _waited(self) -> None:
-        """Nothing came to ride on."""
+        """Send the acknowledgement alone: nothing came to ride on."""
         if self.dialogue:
             self.dialogue = False
             self._patience = self._options.delayed_ack

@@ -76,14 +76,14 @@ class ByTime:
             self._latest_end = sent.end
 
     def needless(self, acknowledged: int, next_byte: int) -> None:
-        """A segment arrived twice: widen the window, once per round trip."""
+        """Widen the window, once per round trip: a segment arrived twice."""
         if self._duplicate_round < 0 or acknowledged >= self._duplicate_round:
             self._duplicate_round = next_byte
             self._steps += 1
             self._persist = _PERSISTS
 
     def recovered(self) -> None:
-        """A recovery has ended."""
+        """Note that a recovery has ended."""
         self._persist -= 1
         if self._persist <= 0:
             self._steps = 1
@@ -145,7 +145,7 @@ class ByCount(ByTime):
         return 0.0
 
     def on_timeout(self, board: Scoreboard, now: float) -> None:
-        """Everything is lost (RFC 6675, section 5.1)."""
+        """Take everything for lost (RFC 6675, section 5.1)."""
         for sent in board.queue:
             if not sent.sacked:
                 board.mark_lost(sent)
@@ -205,11 +205,11 @@ class Recovery:
         self._probe_repeats = False
 
     def repeated(self, now: float) -> None:
-        """A segment held to be lost is sent again at `now` [s]."""
+        """Note that a segment held to be lost is sent again at `now` [s]."""
         self._first_repeat = min(self._first_repeat, now)
 
     def doubted(self) -> None:
-        """An acknowledgement selects something, or tells of a duplicate.
+        """Take an acknowledgement that selects something, or tells of a duplicate.
 
         Outside of a recovery Linux forgets by it when the last one had sent something again; so
         what a needless time-out has sent twice does not hide that the next is needless, too.
@@ -218,16 +218,16 @@ class Recovery:
             self._first_repeat = inf
 
     def sent(self) -> None:
-        """A segment leaves, new or again."""
+        """Note that a segment leaves, new or again."""
         self._reduction.sent += 1
 
     def probed(self, end: int, repeats: bool) -> None:
-        """A tail-loss probe has been sent, up to byte `end`, new or again."""
+        """Note that a tail-loss probe has been sent, up to byte `end`, new or again."""
         self.probe_end = end
         self._probe_repeats = repeats
 
     def judge_probe(self, now: float, acknowledged: int, news: bool, duplicate: bool) -> None:
-        """Did the probe mend a loss by itself? RFC 8985, section 7.4.
+        """Judge whether the probe mended a loss by itself: RFC 8985, section 7.4.
 
         Args:
             now: [s].
@@ -246,7 +246,7 @@ class Recovery:
         self.probe_end = -1
 
     def progress(self, acknowledged: int, echo: float) -> None:
-        """The left edge moved: is the recovery over, or was it needless?"""
+        """Judge, as the left edge moved, whether the recovery is over, or was needless."""
         if self.state == OPEN:
             return
         over = acknowledged >= self._until
@@ -286,7 +286,7 @@ class Recovery:
         return self.state == RECOVERY
 
     def time_out(self, now: float, first: int, next_byte: int) -> None:
-        """RFC 5681, equation 4: not for a segment that the timer has sent again already.
+        """Time out by RFC 5681, equation 4: not for a segment that was sent again already.
 
         Nor within a recovery, whose threshold is that of the same window. RFC 8985, section 6.3.
         """

@@ -89,7 +89,7 @@ class RoundTrip:
             self.minimum = rtt
 
     def without_sample(self) -> None:
-        """The opening was repeated, so it measured nothing: RFC 6298, rule 5.7."""
+        """Go on without a sample, as the opening was repeated: RFC 6298, rule 5.7."""
         self.timeout = max(self.timeout, 3.0)
 
     def _follow(self, rtt: float, acknowledged: int, sent: int) -> None:
@@ -211,7 +211,7 @@ class Alarm:
         self._timeout_at = self.doubt = 0.0
 
     def timeout(self) -> float:
-        """Retransmission time-out with its back-off [s]."""
+        """Return the retransmission time-out with its back-off [s]."""
         return min(self._times.timeout * 2.0**self.back_off, self._options.max_rto)
 
     def stop(self) -> None:
@@ -277,7 +277,7 @@ class Alarm:
             self._timer.set(now + self.timeout())
 
     def _probe_time(self, segments: int) -> float:
-        """RFC 8985, section 7.2: a single segment may meet a delayed acknowledgement."""
+        """Return the delay by RFC 8985, section 7.2; one segment may meet a delayed answer."""
         if not self._times.smoothed:
             return self._options.first_rto
         patience = self._options.min_rto if segments == 1 else SOONEST_S

@@ -76,7 +76,7 @@ class SendBuffer:
         return 3 * self.used <= 2 * self.limit
 
     def take(self, count: int) -> int:
-        """Charge up to `count` bytes [B]; returns how many found room."""
+        """Return the charge up to `count` bytes [B]; returns how many found room."""
         waiting = self._waiting
         taken = 0
         if waiting and waiting[-1] < self._packet:
@@ -107,7 +107,7 @@ class SendBuffer:
         return size + packets * PACKET_COST
 
     def release(self, charge: int) -> None:
-        """Acknowledged: give back its charge [B]."""
+        """Release an acknowledged segment: give back its charge [B]."""
         self.used -= charge
 
     def reopens(self, window: float, in_flight: int) -> bool:
@@ -245,13 +245,13 @@ class Scoreboard:
             self.resent -= 1
 
     def forgive(self) -> None:
-        """None of them was lost after all."""
+        """Forgive losses: none of them was lost after all."""
         for sent in self.queue:
             sent.lost = False
         self.lost = 0
 
     def repeat(self, sent: SentSegment, now: float, probes: bool = False) -> None:
-        """A segment is sent again at `now` [s].
+        """Repeat a segment at `now` [s].
 
         One that probes for a tail loss is not counted in flight once more, as in Linux.
         """

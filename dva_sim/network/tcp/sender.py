@@ -74,7 +74,7 @@ class Sender:
         self._use_round = 0
 
     def established(self, round_trip: float | None, repeated: int, edge: int) -> None:
-        """The opening is over: its round trip [s] if one was measured, its repetitions."""
+        """Note the end of the opening: its round trip [s] if one was measured, its repetitions."""
         self.edge = edge
         self.buffer.offered(edge)
         if round_trip is not None:
@@ -101,7 +101,7 @@ class Sender:
         return self.buffer.reopens(self.window.window, self.board.in_flight)
 
     def finish(self) -> None:
-        """Nothing more will be written; the end itself counts as a byte."""
+        """Finish writing; the end itself counts as a byte."""
         self.end_mark = self.total
         self.total += 1
         self._push(self._clock.now)
@@ -330,7 +330,7 @@ class Sender:
         self._alarm.restart(now)
 
     def _time_out(self, now: float) -> None:
-        """RFC 6298, rules 5.4 to 5.6."""
+        """Time out by RFC 6298, rules 5.4 to 5.6."""
         self.timeouts += 1
         self._alarm.doubt = 0.0
         self.recovery.time_out(now, self.first, self.next)

@@ -75,7 +75,7 @@ class Bottleneck:
         self._lines = {way: SharedLine(config.rate_bps) for way in WAYS}
 
     def link(self, flow: str, way: Direction, priority: bool = False) -> Link:
-        """The way of a flow over the link; it counts only what is the flow's own.
+        """Return the way of a flow over the link; it counts only what is the flow's own.
 
         Args:
             flow: Name of the flow, which selects its random stream.
@@ -258,7 +258,7 @@ class Fates:
     crucial: list[bool] = field(default_factory=list)
 
     def add(self, now: float, *, crucial: bool = False) -> int:
-        """A new message; its number."""
+        """Add a new message; return its number."""
         self.made.append(now)
         self.arrived.append(math.inf)
         self.crucial.append(crucial)
@@ -353,7 +353,7 @@ def _feed(
     fates: tuple[Fates, Fates],
     streams: Streams,
 ) -> None:
-    """Commands and pictures at their rates, from times of their own on."""
+    """Feed commands and pictures at their rates, from times of their own on."""
     commands, pictures = fates
     every = config.commands.crucial_every
 

@@ -52,7 +52,7 @@ class RoundTrips:
         self._backoff = 1.0
 
     def back_off(self) -> None:
-        """A time-out has passed: wait twice as long the next time."""
+        """Back off after a time-out: wait twice as long the next time."""
         self._backoff *= 2.0
 
 
@@ -82,11 +82,11 @@ class Feedback:
         return max(oldest, self._heard) + self.round_trips.timeout
 
     def sent(self, now: float, number: int) -> None:
-        """Datagram `number` was sent at `now` [s]."""
+        """Note that datagram `number` was sent at `now` [s]."""
         self._pending[number] = now
 
     def acknowledged(self, now: float, echoes: Sequence[Echo]) -> list[int]:
-        """An acknowledgement has come.
+        """Take an acknowledgement.
 
         Args:
             now: [s]
@@ -111,7 +111,7 @@ class Feedback:
         return gone
 
     def give_up(self) -> list[int]:
-        """The time-out has passed: everything pending is lost."""
+        """Give up everything pending after the time-out."""
         self.round_trips.back_off()
         return self._drop(self._pending)
 

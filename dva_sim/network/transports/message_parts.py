@@ -21,7 +21,7 @@ class MessagePart(NamedTuple):
 
 
 def parts_of(message: TransportMessage, header: int) -> list[MessagePart]:
-    """The datagrams that a message is cut into, all full but the last.
+    """Return the datagrams that a message is cut into, all full but the last.
 
     Args:
         message: Message to send.
@@ -45,7 +45,7 @@ class Assembly:
         self._missing: dict[int, set[int]] = {}
 
     def add(self, part: MessagePart) -> None:
-        """A part has arrived, perhaps once more."""
+        """Add a part that has arrived, perhaps once more."""
         number = part.message.number
         missing = self._missing.setdefault(number, set(range(part.pieces)))
         if part.place in missing:

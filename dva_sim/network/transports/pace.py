@@ -90,11 +90,11 @@ class Pace:
         return self._feedback.round_trips.timeout if self._unanswered >= FIRST_FLIGHT else 0.0
 
     def sent(self) -> None:
-        """A datagram was sent."""
+        """Note that a datagram was sent."""
         self._unanswered += 1
 
     def heard(self, now: float) -> None:
-        """An acknowledgement has come at `now` [s]; perhaps a round trip has passed."""
+        """Take an acknowledgement at `now` [s]; perhaps a round trip has passed."""
         samples = self._feedback.samples
         smoothed = self._feedback.round_trips.smoothed
         if not samples or smoothed is None:
@@ -108,7 +108,7 @@ class Pace:
             self._restart(now)
 
     def lost(self, now: float) -> None:
-        """Something is lost, as is known at `now` [s]."""
+        """Note a loss that is known at `now` [s]."""
         if self._begun and now >= self._deaf_until:
             self._law.lost()
             self._deaf_until = now + (self._feedback.round_trips.smoothed or 0.0)

@@ -67,7 +67,7 @@ class DatagramSender:
         self.on_arrival: Callable[[], object] = lambda: None
 
     def offer(self, message: TransportMessage) -> None:
-        """There is something to send; what has not begun to be sent is replaced by it."""
+        """Offer something to send; what has not begun to be sent is replaced by it."""
         if message.crucial and self._repeats:
             self._crucial += parts_of(message, self._header)
         else:
@@ -75,7 +75,7 @@ class DatagramSender:
         self._pump()
 
     def hear(self, echoes: Sequence[Echo]) -> None:
-        """The other end tells what it has got."""
+        """Hear from the other end what it has got."""
         now = self._clock.now
         self._lose(now, self._feedback.acknowledged(now, echoes))
         self._pace.heard(now)
@@ -87,7 +87,7 @@ class DatagramSender:
         return [(number, now - since) for number, since in self._seen]
 
     def _lose(self, now: float, gone: Sequence[int]) -> None:
-        """Datagrams are lost: the law hears of it, and the crucial ones go again."""
+        """Take datagrams for lost: the law hears of it, and the crucial ones go again."""
         if gone:
             self._crucial += [self._to_repeat.pop(n) for n in gone if n in self._to_repeat]
             self._pace.lost(now)
@@ -144,14 +144,14 @@ class DatagramSender:
         self._watch()
 
     def _arrive(self, number: int, part: MessagePart) -> None:
-        """At the other end."""
+        """Arrive at the other end."""
         self._seen.append((number, self._clock.now))
         self._assembly.add(part)
         self.on_arrival()
 
 
 def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> TransportSession:
-    """A session over a transport, as configured."""
+    """Return a session over a transport, as configured."""
     if isinstance(config, Tcp):
         return tcp_session(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
     if isinstance(config, Zeromq):
@@ -166,7 +166,7 @@ def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> Transport
 
 
 def plain_session(clock: Clock, ends: Ends, header: int) -> TransportSession:
-    """Every datagram at once, none of them twice; the header [B] is besides IP and UDP."""
+    """Return every datagram at once, none of them twice; the header [B] is besides IP and UDP."""
 
     def sends(link: Link, deliver: Deliver) -> Callable[[TransportMessage], object]:
         add = Assembly(deliver).add

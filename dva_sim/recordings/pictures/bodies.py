@@ -70,7 +70,7 @@ class DrawnBody:
         return self._moments.is_there(self.name, time)
 
     def show(self, time: float) -> list[Artist]:
-        """The body at a moment [s]."""
+        """Return the body at a moment [s]."""
         past = self._moments.past(self.name, time)
         step = max(1, round(STEP / max(1e-3, (past[-1].time - past[0].time) / len(past))))
         past = [*past[:-1:step], past[-1]]

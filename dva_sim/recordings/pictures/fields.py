@@ -64,7 +64,7 @@ class DrawnFields:
         self._sources = [_Source(ax, hazard) for hazard in moments.looks.values()]
 
     def show(self, time: float) -> list[Artist]:
-        """The hazards at a moment [s]."""
+        """Return the hazards at a moment [s]."""
         artists: list[Artist] = []
         picture: NDArray[Any] | None = None
         for what, paint in self._paints.items():
@@ -98,7 +98,7 @@ class _Contours:
             ax.add_collection(lines, autolim=False)
 
     def show(self, raster: Raster) -> list[Artist]:
-        """Those of a field."""
+        """Return those of a field."""
         west, east, south, north = raster.extent
         rows, columns = raster.values.shape
         x = west + (np.arange(columns) + 0.5) * (east - west) / columns
@@ -121,7 +121,7 @@ class _Source:
         )  # fmt: skip
 
     def show(self, moments: Moments, time: float) -> list[Artist]:
-        """Those of a kind that go on."""
+        """Return those of a kind that go on."""
         hazards = (incident.hazard for incident in moments.going_on(time))
         places = [hazard.position for hazard in hazards if hazard.title == self._title]
         if not places:
@@ -131,7 +131,7 @@ class _Source:
 
 
 def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:
-    """One translucent picture over another `(rows, columns, 4)`."""
+    """Return one translucent picture over another `(rows, columns, 4)`."""
     a = upper[..., 3:]
     b = under[..., 3:]
     cover = a + b * (1 - a)
@@ -140,7 +140,7 @@ def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:
 
 
 def _tinted(colour: str, cover: NDArray[Any]) -> NDArray[Any]:
-    """One colour that covers the floor more or less, `(rows, columns, 4)`."""
+    """Return one colour that covers the floor more or less, `(rows, columns, 4)`."""
     picture = np.empty((*cover.shape, 4))
     picture[..., :3] = to_rgb(colour)
     picture[..., 3] = cover
@@ -157,13 +157,13 @@ def _water(depth: NDArray[Any]) -> NDArray[Any]:
 
 
 def _gas(share: NDArray[Any]) -> NDArray[Any]:
-    """By share of the lower explosive limit: above it, it could explode."""
+    """Return colours by share of the lower explosive limit: above it, it could explode."""
     cover = np.interp(share, (0.0, 0.02, *style.GAS_LEVELS), (0.0, 0.0, 0.12, 0.2, 0.34, 0.55))
     return _tinted(colours.GAS, cover)
 
 
 def _heat(flux: NDArray[Any]) -> NDArray[Any]:
-    """From yellow to red as it gets hotter."""
+    """Return colours from yellow to red as it gets hotter."""
     strong = np.clip(np.log10(np.maximum(flux, LEAST_HEAT) / LEAST_HEAT) / 1.5, 0.0, 1.0)
     picture = _tinted(colours.FIRE, 0.55 * np.sqrt(strong))
     picture[..., 1] += (1 - strong) * 0.5

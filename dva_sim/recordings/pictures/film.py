@@ -71,14 +71,14 @@ class Film:
         return math.ceil(self.duration / self.speed * FPS) + round(HELD_S * FPS)
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
-        """Pictures in order, each of shape `(height, width, 3)`."""
+        """Yield pictures in order, each of shape `(height, width, 3)`."""
         moving = math.ceil(self.duration / self.speed * FPS)
         for number in range(moving):
             yield self.at(number / FPS * self.speed)
         yield from [self.at(self.duration)] * (len(self) - moving)
 
     def at(self, time: float) -> NDArray[np.uint8]:
-        """The picture at a moment of the run [s]."""
+        """Return the picture at a moment of the run [s]."""
         self._canvas.restore_region(self._background)
         renderer = self._canvas.get_renderer()
         for part in self._parts:
@@ -107,7 +107,7 @@ class _Eye:
         ax.set_anchor("NW")
 
     def show(self, time: float) -> list[Artist]:
-        """The picture at a moment [s]; after the end of the run its last one."""
+        """Return the picture at a moment [s]; after the end of the run its last one."""
         robots = self._moments.names(ROBOT)
         if not robots:
             return []
@@ -160,7 +160,7 @@ class Traffic:
         ]
 
     def show(self, time: float) -> list[Artist]:
-        """The strip at a moment [s]; after the end of the run its last one."""
+        """Return the strip at a moment [s]; after the end of the run its last one."""
         time = self._moments.within(time)
         for times, height, lines in self._strips:
             inside = times[(times > time - WINDOW_S) & (times <= time)] - time

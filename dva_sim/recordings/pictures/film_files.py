@@ -38,7 +38,7 @@ def write_film(film: Film, path: Path) -> None:
 
 
 def find_ffmpeg() -> str:
-    """Path of ffmpeg: the one of the `imageio-ffmpeg` package, or else of the system.
+    """Return the path of ffmpeg: the one of the `imageio-ffmpeg` package, or else of the system.
 
     Raises:
         ConfigError: there is none.
@@ -78,7 +78,7 @@ def _write_gif(film: Film, path: Path) -> None:
 
 
 def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
-    """Pictures that change only where one can see it: what stays the same takes no room."""
+    """Yield pictures that change only where one can see it: what stays the same takes no room."""
     shown = next(frames)
     yield shown
     for frame in frames:

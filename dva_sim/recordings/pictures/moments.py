@@ -59,7 +59,7 @@ class Moments:
     # --- who is where ------------------------------------------------------------------
 
     def names(self, *kinds: str) -> list[str]:
-        """Everybody of some kinds who left a track."""
+        """Return everybody of some kinds who left a track."""
         return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
 
     def within(self, time: float) -> float:
@@ -110,7 +110,7 @@ class Moments:
         return PERSON if robot is None else self.recording.radii[robot]
 
     def glance(self, time: float) -> Glance | None:
-        """The newest picture that an operator at the wheel looks at, if there is one."""
+        """Return the newest picture that an operator at the wheel looks at, if there is one."""
         labels = self.recording.labels
         for drive in self.recording.recorder.drives:
             captured = _shown(drive, time)

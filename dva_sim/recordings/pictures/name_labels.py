@@ -35,7 +35,7 @@ class Box(NamedTuple):
     y1: float
 
     def overlap(self, other: Box) -> float:
-        """Square root of the area that two share [pixels]."""
+        """Return the square root of the area that two share [pixels]."""
         wide = min(self.x1, other.x1) - max(self.x0, other.x0)
         high = min(self.y1, other.y1) - max(self.y0, other.y0)
         return float((wide * high) ** 0.5) if wide > 0 and high > 0 else 0.0
@@ -71,7 +71,7 @@ class Names:
         self._rooms: list[Box] = []  # known once the figure has its layout
 
     def show(self, time: float, sources: Sequence[tuple[float, float]]) -> list[Artist]:
-        """The names at a moment [s]; the sources of hazards stay clear, too [m]."""
+        """Return the names at a moment [s]; the sources of hazards stay clear, too [m]."""
         canvas: Any = self._ax.figure.canvas
         renderer = canvas.get_renderer()
         frame = Box(*self._ax.get_window_extent(renderer).extents)
@@ -117,7 +117,7 @@ class Names:
 
 
 def _beside(mark: Box, size: tuple[float, float], side: tuple[int, int]) -> Box:
-    """A box of a size on one side of another."""
+    """Return a box of a size on one side of another."""
     x = (mark.x0 + mark.x1) / 2
     y = (mark.y0 + mark.y1) / 2
     half = (mark.x1 - mark.x0) / 2 + 1.5

@@ -83,7 +83,7 @@ class Sheet:
         return MARGIN + column * (self._across + GAP)
 
     def _map(self, column: int, top: float, size: tuple[float, float], run: Moments) -> Axes:
-        """A map in the middle of its column."""
+        """Return a map in the middle of its column."""
         width, height = size
         left = self._left(column) + (self._across - width) / 2
         ax = self._axes(left, MARGIN + top + TITLE_HEIGHT, width, height)
@@ -91,7 +91,7 @@ class Sheet:
         return ax
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
-        """Axes by their place from the upper left corner."""
+        """Return axes by their place from the upper left corner."""
         wide = WIDTH
         high = self._height
         box = left / wide, 1.0 - (top + height) / high, width / wide, height / high
@@ -113,7 +113,7 @@ def heading_of(recordings: Sequence[Playback]) -> str:
 
 
 def _new_figure(dpi: float) -> Figure:
-    """A figure that is drawn without any window."""
+    """Return a figure that is drawn without any window."""
     figure = Figure(figsize=(WIDTH, WIDTH), dpi=dpi)
     canvas: Any = FigureCanvasAgg
     canvas(figure)
@@ -121,7 +121,7 @@ def _new_figure(dpi: float) -> Figure:
 
 
 def _size_of_map(recording: Playback, across: float) -> tuple[float, float]:
-    """Width and height of a map that is so wide at most."""
+    """Return the width and height of a map that is so wide at most."""
     (left, right), (low, high) = limits(recording.site)
     shape = (high - low) / (right - left)
     height = min(TALLEST, across * shape)
@@ -129,7 +129,7 @@ def _size_of_map(recording: Playback, across: float) -> tuple[float, float]:
 
 
 def _add_key(figure: Figure, runs: Sequence[Moments]) -> float:
-    """A key below all maps, in as few lines as it fits into; its height."""
+    """Return a key below all maps, in as few lines as it fits into; its height."""
     canvas: Any = figure.canvas
     handles = legend(runs)
     for columns in range(len(handles), 0, -1):

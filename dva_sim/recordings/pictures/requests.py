@@ -42,7 +42,7 @@ class Wanted:
 
     @classmethod
     def of(cls, options: PictureOptions) -> Wanted:
-        """From the options of `dva_sim.episode` and `dva_sim.replay`."""
+        """Return the wish from the options of `dva_sim.episode` and `dva_sim.replay`."""
         film, moment = (None if p is None else Path(p) for p in (options.video, options.still))
         at = None if options.at is None else _seconds(options.at)
         return cls(film, moment, at, options.camera, options.inset)
@@ -111,7 +111,7 @@ class Wanted:
 
 
 def joined(words: object) -> str:
-    """One word or number, or several, as on the command line."""
+    """Return one word or number, or several, as on the command line."""
     several = words if isinstance(words, list | tuple) else [words]
     return ",".join(map(str, several))
 

@@ -61,14 +61,14 @@ def story(runs: Sequence[Playback]) -> list[str]:
 
 
 def pattern_name(run: Playback) -> str:
-    """The messaging pattern of a run, as reports call it."""
+    """Return the messaging pattern of a run, as reports call it."""
     pattern = run.scenario.pattern
     shipped = PATTERNS.get(pattern)
     return shipped.title if shipped else pattern.rpartition(":")[2]
 
 
 def seconds(time: float) -> str:
-    """A span of time: whole seconds, but tenths of a short one."""
+    """Return a span of time: whole seconds, but tenths of a short one."""
     return f"{time:.0f} s" if time >= 10.0 else f"{time:.1f} s"
 
 

@@ -65,7 +65,7 @@ class Scene:
             self._ended.set_fontsize(style.TITLE)
 
     def _draw_ground(self) -> tuple[Any, Any]:
-        """The site; the limits of what is seen."""
+        """Return the site; the limits of what is seen."""
         ax = self._ax
         site = self._moments.recording.site
         draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
@@ -80,7 +80,7 @@ class Scene:
         return ax.get_xlim(), ax.get_ylim()
 
     def _line(self, colour: str | None = None) -> Any:
-        """A line of text below the map; in a box of a colour."""
+        """Return a line of text below the map; in a box of a colour."""
         box = {"boxstyle": "round,pad=0.25", "fc": colour, "ec": "none"} if colour else None
         return self._ax.annotate(
             " ", (0.5, 0.0), xycoords="axes fraction", xytext=(0, -4), textcoords="offset points",
@@ -90,7 +90,7 @@ class Scene:
         )  # fmt: skip
 
     def show(self, time: float) -> list[Artist]:
-        """Artists that change, as they are at a moment [s], the lowest first."""
+        """Return artists that change, as they are at a moment [s], the lowest first."""
         now = self._moments.within(time)
         artists = [*self._fields.show(now), *self._upper]
         for body in self._bodies:
@@ -102,7 +102,7 @@ class Scene:
         return [*artists, self._clock, self._below(now)]
 
     def _below(self, time: float) -> Artist:
-        """The line below the map: what happened last, or how it ended."""
+        """Return the line below the map: what happened last, or how it ended."""
         ended: Artist = self._ended
         if self._verdict.text and time >= self._verdict.time:
             return ended
@@ -114,12 +114,12 @@ class Scene:
         return line
 
     def _across(self) -> float:
-        """Width of the map [points]."""
+        """Return the width of the map [points]."""
         figure: Any = self._ax.figure
         return float(self._ax.bbox.width * 72 / figure.dpi)
 
     def freeze(self, canvas: Any) -> None:
-        """From now on draw what stands still as one sheet: the layout is final."""
+        """Draw what stands still as one sheet from now on: the layout is final."""
         renderer = type(canvas.get_renderer())(*canvas.get_width_height(), canvas.figure.dpi)
         for artist in sorted(self._upper, key=lambda artist: artist.get_zorder()):
             artist.draw(renderer)
@@ -141,7 +141,7 @@ class _Sheet:
         self._pixels = np.asarray(renderer.buffer_rgba())[::-1].copy()  # from the lowest row up
 
     def get_zorder(self) -> float:
-        """Over walls and names, under lines of equal heat or gas."""
+        """Return an order over walls and names, under lines of equal heat or gas."""
         return 4.2
 
     def draw(self, renderer: Any) -> None:
@@ -157,6 +157,6 @@ def _colour_of(verdict: RunVerdict) -> str:
 
 
 def _newest_line(timeline: Sequence[Moment], time: float) -> str:
-    """The newest line of the story."""
+    """Return the newest line of the story."""
     reports = [m for m in timeline if m.time <= time and m.kind != "link"]
     return f"{reports[-1].who} {reports[-1].what}".replace("_", " ") if reports else ""

@@ -59,7 +59,7 @@ HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
 
 
 def colour_of(kind: str, mode: str) -> str:
-    """Colour of somebody who does something."""
+    """Return the colour of somebody who does something."""
     if kind == BYSTANDER and mode == "walking":
         return KINDS[kind]  # green is for guards
     modes = ROBOT_MODES if kind == ROBOT else ACTIVITIES
@@ -67,7 +67,7 @@ def colour_of(kind: str, mode: str) -> str:
 
 
 def legend(moments: Iterable[Moments]) -> list[Artist]:
-    """A key for what occurs in some runs."""
+    """Return a key for what occurs in some runs."""
     runs = list(moments)
     handles = []
     for kind in (ROBOT, GUARD, BYSTANDER):
@@ -105,6 +105,6 @@ def _dot(shape: str, colour: str, label: str, edge: str = "white") -> Any:
 
 
 def _order(mode: str) -> tuple[int, str]:
-    """Modes as they are listed above, others after them."""
+    """Return modes as they are listed above, others after them."""
     known = [*ROBOT_MODES, *ACTIVITIES]
     return (known.index(mode) if mode in known else len(known)), mode

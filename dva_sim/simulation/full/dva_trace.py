@@ -87,17 +87,17 @@ class TracedDva:
         return self._decided(values, lambda: self._core.note(message, now))
 
     def delivered(self, send: Send, now: float, content: Any = None) -> list[Send]:
-        """Answered with OK, and with this content."""
+        """Return the answered with OK, and with this content."""
         entry = self._about(send, now, m.Reply(1, m.OK, "", content))
         return self._decided(entry, lambda: self._core.delivered(send, now, content))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
-        """Answered, but not with OK."""
+        """Return the answered, but not with OK."""
         entry = self._about(send, now, reply)
         return self._decided(entry, lambda: self._core.refused_grant(send, reply, now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """Not answered."""
+        """Take an order that was not answered."""
         return self._decided(
             self._about(send, now, None), lambda: self._core.undelivered(send, now)
         )
@@ -107,20 +107,20 @@ class TracedDva:
         return self._decided({"do": "tick", "now": now}, lambda: self._core.tick(now))
 
     def go_on(self) -> list[Send]:
-        """After a recall."""
+        """Go on after a recall."""
         return self._decided({"do": "go on"}, self._core.go_on)
 
     def dismiss(self, device: str, now: float) -> list[Send]:
-        """Somebody is to be there no more."""
+        """Dismiss somebody."""
         values = {"do": "dismiss", "device": device, "now": now}
         return self._decided(values, lambda: self._core.dismiss(device, now))
 
     def close(self) -> list[Send]:
-        """The end."""
+        """Return the end."""
         return self._decided({"do": "close"}, self._core.close)
 
     def check_access(self, now: float) -> None:
-        """Only a memory that was recalled asks for this from outside."""
+        """Do nothing: only a memory that was recalled asks for this from outside."""
         self._core.check_access(now)
         self._sink(json.dumps({"do": "recall", "now": now}))
 
@@ -156,11 +156,11 @@ class TracedDva:
 
 
 def _nowhere(_: str) -> None:
-    """Takes what is kept no longer."""
+    """Take what is kept no longer."""
 
 
 def traced(core: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
-    """A core that is written down; see `TracedDva`."""
+    """Return a core that is written down; see `TracedDva`."""
     return cast(Dva, TracedDva(core, sink, stage, memory))
 
 
@@ -173,7 +173,7 @@ def _parts(decision: Any) -> tuple[m.Reply | None, list[Send]]:
 
 
 def _in_words(decision: Any) -> list[str]:
-    """The reply, if there is one, and what else is sent."""
+    """Return the reply, if there is one, and what else is sent."""
     reply, sends = _parts(decision)
     return [*([] if reply is None else [repr(reply)]), *map(repr, sends)]
 
@@ -290,7 +290,7 @@ class _Again:
 
 
 def _refuse_own_code(scenario: Scenario) -> None:
-    """A class in a file is run only when somebody names it, never because a trace does.
+    """Refuse a class in a file, which runs only when somebody names it, never by a trace.
 
     Raises:
         ValueError: the DVA or its map would need one.

@@ -176,7 +176,7 @@ class EventLedger:
     # --- what is said --------------------------------------------------------------------
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
-        """Something has reached the DVA; `source` has really sent it."""
+        """Note what has reached the DVA; `source` has really sent it."""
         if message is None or message.source != source:
             return
         self.is_heard(source, now)
@@ -214,11 +214,11 @@ class EventLedger:
         word.freed = word.freed or device in word.ordered
 
     def is_heard(self, source: str, now: float) -> None:
-        """The DVA has heard a device, whatever it said."""
+        """Note that the DVA has heard a device, whatever it said."""
         self._heard[source] = now
 
     def kept_nothing_for(self, seconds: float) -> None:
-        """The DVA that has been killed could write nothing for so long before [s]."""
+        """Note that the DVA that was killed could write nothing for so long before [s]."""
         self._not_kept = seconds
 
     def waits_for(self, data: bytes) -> bool:
@@ -227,7 +227,7 @@ class EventLedger:
         return any(what in data for what in _ORDERED) or (bool(asked) and b"<reply>" in data)
 
     def says(self, message: m.Message | None) -> None:
-        """The DVA sends an order, or an answer."""
+        """Note that the DVA sends an order, or an answer."""
         if message is None:
             return
         match message.body:
@@ -302,7 +302,7 @@ class EventLedger:
         return place is not None and apart(place, event.position) <= self._at_event
 
     def _answers(self, reporter: str, reply: m.Reply) -> None:
-        """The DVA has taken a report: then there is an event. Or a person's word: it is none."""
+        """Note that the DVA has taken a report, so there is an event, or a person's word: none."""
         none = self._called_false.pop((reporter, reply.answers), None)
         if none is not None and reply.code == m.OK:
             self._word(none).found.add("refuted")

@@ -121,7 +121,7 @@ def beginning_of(
 def _hearsay(
     first: float, place: tuple[float, float], site: Site, rng: np.random.Generator
 ) -> Hearsay:
-    """Somewhere free near the true place, in the same room."""
+    """Return a free place near the true place, in the same room."""
     time = first + float(rng.uniform(*HEARSAY_LATE))
     for _ in range(TRIES):
         far = HEARSAY_WITHIN * rng.uniform()
@@ -196,7 +196,7 @@ class RunHazards:
         return [incident.spot(now) for incident in self._going_on(now)]
 
     def contain(self, kind: str, x: float, y: float) -> None:
-        """Somebody has dealt with what is at a place [m]: from now on it harms nobody."""
+        """Deal with what is at a place [m]: from now on it harms nobody."""
         now = self.stage.clock.now
         for number, incident in enumerate(self.incidents):
             near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE

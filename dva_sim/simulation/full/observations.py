@@ -483,7 +483,7 @@ _BOTH = "both"
 
 
 def event_facts(event: Event, where: str) -> dict[str, Any]:
-    """An event as facts have it; `where`: among the open or the closed ones, or `both`."""
+    """Return an event as facts have it; `where`: among the open or the closed ones, or `both`."""
     return {
         "number": event.number,
         "kind": event.kind,

@@ -75,7 +75,7 @@ class Field(RunHazards):
             self._schedule(number, incident)
 
     def truth(self, robot: str) -> Truth[Observation]:
-        """The true state of a robot."""
+        """Return the true state of a robot."""
         return Truth(self.robots[robot].observe())
 
     def is_near(self, dangers: Iterable[Danger], x: float, y: float) -> bool:
@@ -115,7 +115,7 @@ class Field(RunHazards):
     # --- what happens ------------------------------------------------------------------
 
     def _schedule(self, number: int, incident: RunHazard) -> None:
-        """Detectors are devices too: those that will notice something register and report."""
+        """Schedule detectors that will notice something: they register and report as devices."""
         stage = self.stage
         if not incident.false_alarm:
             stage.clock.call_at(

@@ -144,7 +144,7 @@ class Playback:
         return person or any(fact.role is not None for fact in self.facts)
 
     def robot_named(self, label: str) -> str | None:
-        """The id of a robot, if there is one of that name."""
+        """Return the id of a robot, if there is one of that name."""
         return next((robot for robot in self.radii if self.label_of(robot) == label), None)
 
     def label_of(self, device: str) -> str:
@@ -172,7 +172,7 @@ class Recording(Playback):
     persons: tuple[int, ...] = ()
 
     def event_of(self, number: int) -> Event | None:
-        """The DVA's event about incident `number`, if it knows of it."""
+        """Return the DVA's event about incident `number`, if it knows of it."""
         return event_about(self.incidents[number], self.events, self.site, self.robots)
 
 
@@ -190,7 +190,7 @@ def ending_of(event: Event | None) -> Ending:
 def event_about(
     incident: RunHazard, events: list[Event], site: Site, robots: Collection[str]
 ) -> Event | None:
-    """The DVA's event that an incident was reported as; two near each other are one event.
+    """Return the DVA's event that an incident was reported as; two near each other are one event.
 
     Of what only sensors of robots speak for, the robot's place is known, and not its own.
     """

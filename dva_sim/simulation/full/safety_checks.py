@@ -216,7 +216,7 @@ class Witness:
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
     def given(self, session: int, held: Held) -> None:
-        """The DVA gives a permission, or says that one holds."""
+        """Note that the DVA gives a permission, or says that one holds."""
         self.sessions[session] = held
         if len(self.sessions) > MOST_KEPT:
             forgotten, _ = self.sessions.popitem(last=False)
@@ -235,7 +235,7 @@ class Witness:
         return None
 
     def holder(self) -> str | None:
-        """The holder of a confirmed session whose end the robot has not heard."""
+        """Return the holder of a confirmed session whose end the robot has not heard."""
         held = (s for s in self.sessions if s in self.confirmed and s not in self.over)
         return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
 
@@ -580,7 +580,7 @@ class SafetyAudit:
 
     @staticmethod
     def _confirms(witness: Witness, content: m.Content | None, now: float) -> None:
-        """The DVA has answered a robot that asked who may act on it: nobody else may drive it.
+        """Note the DVA's answer on who may act on a robot: nobody else may drive it.
 
         What it has been told to be over since it asked stays over.
         """
@@ -606,7 +606,7 @@ class SafetyAudit:
         code: int,
         now: float,
     ) -> Iterator[Broken]:
-        """A robot has answered a request, and so has obeyed it or not."""
+        """Note that a robot has answered a request, and so has obeyed it or not."""
         message = asked.message
         body = asked.message.body
         match body:
@@ -648,7 +648,7 @@ class SafetyAudit:
         asked: Unanswered,
         now: float,
     ) -> Iterator[Broken]:
-        """A robot has begun to do what somebody asked for."""
+        """Note that a robot has begun to do what somebody asked for."""
         message = asked.message
         level = "teleoperation" if isinstance(message.body, m.StartTeleOp) else "missions"
         broken = witness.permits(message.source, message.session, level, now)
@@ -677,7 +677,7 @@ class SafetyAudit:
     # --- what robots accept ----------------------------------------------------------------
 
     def accepted(self, command: Accepted) -> None:
-        """A robot has accepted a command to drive, from whomever."""
+        """Note that a robot has accepted a command to drive, from whomever."""
         witness = self.witness(command.robot)
         found: list[Broken] = []
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
@@ -714,7 +714,7 @@ class SafetyAudit:
             self._report(found, command.time, command.robot)
 
     def by_hand(self, done: ByHand) -> None:
-        """Somebody drives a robot at the robot itself: no message tells of that."""
+        """Note that somebody drives a robot at the robot itself: no message tells of that."""
         witness = self.witness(done.robot)
         now = done.time
         found = list[Broken]()
@@ -894,7 +894,7 @@ def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterato
 def broken_by_moving(
     witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
 ) -> list[Broken]:
-    """Rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
+    """Return rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
     speed = motion.speed
     turn_rate = motion.turn_rate
     found: list[Broken] = []
@@ -927,7 +927,7 @@ def _pace(motion: RobotMotion) -> str:
 
 
 def _is_within(speed: float, turn_rate: float, limits: MotorLimits) -> bool:
-    """By comparisons that a nan fails, too; nobody drives backwards."""
+    """Compare such that a nan fails, too; nobody drives backwards."""
     forward = -MOVING <= speed <= limits.max_speed * SLACK
     return forward and abs(turn_rate) <= limits.max_turn_rate * SLACK
 

@@ -35,7 +35,7 @@ def trait_off(scenario: Scenario, trait: str) -> float:
 
 
 def way_off(scenario: Scenario, seed: int) -> float | None:
-    """By how much the way from the first robot's base to the first event is longer than usual [m].
+    """Return how much longer than usual the way to the first event is [m].
 
     As it is planned, a metre near a wall counting more. None where the way is not left to chance
     in this manner: without events or robots, where the way is given, and where bases are chosen
@@ -55,7 +55,7 @@ def way_off(scenario: Scenario, seed: int) -> float | None:
 
 
 def _usual_way(scenario: Scenario, site: Site, planner: Planner) -> float:
-    """The mean over many beginnings."""
+    """Return the mean over many beginnings."""
     seeds = (derive_seed("usual way", number) for number in range(SCENES))
     return math.fsum(_way(scenario, seed, site, planner) for seed in seeds) / SCENES
 

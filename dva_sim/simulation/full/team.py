@@ -77,7 +77,7 @@ class TeamBuilder:
         self._failures: dict[str, int] = {}
 
     def add_robot(self, number: int, registers: bool = True) -> RobotAgent:
-        """The `number`-th robot, in its place; it registers and begins to work.
+        """Return the `number`-th robot, in its place; it registers and begins to work.
 
         Args:
             number: Number, from 1.
@@ -150,7 +150,7 @@ class TeamBuilder:
         )
 
     def _look_after(self, robot: RobotAgent) -> None:
-        """Once a second: is there power, does its drive answer, and is the floor wet?"""
+        """Look after power, drive and a wet floor, once a second."""
         now = self._stage.clock.now
         body = robot.body
         self._world.advance_to(now)
@@ -171,7 +171,7 @@ class TeamBuilder:
             body.grip = WET_GRIP if wet else GRIP
 
     def add_guard(self, number: int) -> GuardAgent | PersonGuard:
-        """The `number`-th guard, at its post; it registers and is on duty.
+        """Return the `number`-th guard, at its post; it registers and is on duty.
 
         Raises:
             ConfigError: there is no place so far from the event, or something is in its way.
@@ -200,7 +200,7 @@ class TeamBuilder:
         return guard
 
     def _played(self, device: AgentDevice, walker: Walker, legs: Walking) -> PersonGuard:
-        """A guard whom a person plays; nobody does as yet."""
+        """Return a guard whom a person plays; nobody does as yet."""
         guard = PersonGuard(
             device,
             walker,
@@ -214,7 +214,7 @@ class TeamBuilder:
         return guard
 
     def add_bystander(self, number: int) -> BystanderAgent:
-        """The `number`-th bystander, at the first of its places, at work.
+        """Return the `number`-th bystander, at the first of its places, at work.
 
         Raises:
             ConfigError: the site has no room for it.
@@ -297,7 +297,7 @@ class TeamBuilder:
         return places[number - 1] if way is None else self._away(f"{kind}-{number}", way)
 
     def _away(self, label: str, length: float) -> Pose:
-        """A place so far [m] from the event, looking along the way there."""
+        """Return a place so far [m] from the event, looking along the way there."""
         site = self._stage.site
         rng = self._stage.streams.fresh(f"{label}/start")
         goal = self._hazards.incidents[0].hazard.position

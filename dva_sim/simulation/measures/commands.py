@@ -59,12 +59,12 @@ ROUND_TRIP_P95 = Measure(
 
 
 def mean(values: Sequence[float] | NDArray[Any]) -> float:
-    """nan of nothing."""
+    """Return nan of nothing."""
     return float(np.mean(values)) if len(values) else NAN
 
 
 def percentile(values: Sequence[float] | Floats, q: float) -> float:
-    """nan of nothing."""
+    """Return nan of nothing."""
     return float(np.percentile(values, q)) if len(values) else NAN
 
 
@@ -74,7 +74,7 @@ def percentiles(name: str, values: Sequence[float] | Floats, which: Iterable[int
 
 
 def ratio(amount: float, of: float) -> float:
-    """nan where there is nothing to be a share of."""
+    """Return nan where there is nothing to be a share of."""
     return amount / of if of else NAN
 
 
@@ -96,7 +96,7 @@ def applied(arrived: Floats) -> Bools:
 
 
 def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> Floats:
-    """From an applied command to the first picture that can show it, for each [s].
+    """Return times from an applied command to the first picture that can show it [s].
 
     Args:
         made: Creation times of the commands [s], shape `(n,)`.

@@ -192,7 +192,7 @@ TRACK_COLUMNS = (
 
 
 def measures_of(scenario: Scenario) -> tuple[str, ...]:
-    """The measures that a run of a scenario may hold: without robots nobody drives one."""
+    """Return the measures that a run of a scenario may hold: without robots nobody drives one."""
     bystanders = scenario.bystander.count
     guards = scenario.guard.count
     there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
@@ -204,7 +204,7 @@ def measures_of(scenario: Scenario) -> tuple[str, ...]:
 
 
 def run_row(recording: Recording) -> Row:
-    """One row per run: the drives to its first event, and what concerns the whole run."""
+    """Return one row per run: the drives to its first event, and what concerns the whole run."""
     row = drive_measures(recording)
     exposure = recording.recorder.exposure
     row["events"] = len(recording.events)
@@ -282,7 +282,7 @@ def _people_measures(recording: Recording) -> Row:
 
 
 def people_rows(recording: Recording) -> list[Row]:
-    """One row per guard and bystander; times that never came are missing."""
+    """Return one row per guard and bystander; times that never came are missing."""
     names = [column.name for column in PEOPLE_COLUMNS]
     never = math.inf
     return [
@@ -292,7 +292,7 @@ def people_rows(recording: Recording) -> list[Row]:
 
 
 def drive_measures(recording: Recording) -> Row:
-    """Measures of driving to the event of the run's first drive; times in [s].
+    """Return measures of driving to the event of the run's first drive; times in [s].
 
     `drive_time_s` runs from the first order to the confirmation, over all attempts and their
     operators. The whole horizon stands for an event that no robot confirmed, be it that none
@@ -344,7 +344,7 @@ def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
 
 
 def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
-    """Age, rate and fate of the commands of all attempts."""
+    """Return the age, rate and fate of the commands of all attempts."""
     spans = [_span(d, recording) for d in attempts]
     driving = sum(end - start for start, end in spans)
     drives = [driven(d, end) for d, (_, end) in zip(attempts, spans, strict=True)]
@@ -380,13 +380,13 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
 
 
 def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
-    """From when to when a drive was under way [s]; nothing if it never started."""
+    """Return from when to when a drive was under way [s]; nothing if it never started."""
     end = drive.ended if drive.ended is not None else recording.duration
     return (drive.started if drive.started is not None else end), end
 
 
 def event_rows(recording: Recording) -> list[Row]:
-    """One row per event that happened, in order; none is left out (S6).
+    """Return one row per event that happened, in order; none is left out (S6).
 
     The columns `outcome`, `confirmation_s`, `closing_s` and `watched_s` are what competing
     outcomes are estimated from, as for the timed model: see `shifts.fates`.

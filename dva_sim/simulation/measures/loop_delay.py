@@ -92,7 +92,7 @@ class Driven(NamedTuple):
 
 
 def driven(log: DriveLog, end: float) -> Driven:
-    """The commands made in a drive that took effect until `end` [s], and for how long.
+    """Return the commands made in a drive that took effect until `end` [s], and for how long.
 
     Some of the previous drive may still have been under way.
     """
@@ -112,7 +112,7 @@ def command_ages(drives: Sequence[Driven]) -> Row:
 
 
 def delay_budget(drives: Sequence[Driven], motor: float) -> Row:
-    """The mean of each stage, their sum, and the whole as it was measured.
+    """Return the mean of each stage, their sum, and the whole as it was measured.
 
     Nothing (nan) where no command rests on a picture: nobody tilts, or the filter is frozen.
 
@@ -161,6 +161,6 @@ def _stages(drive: Driven) -> Floats:
 
 
 def _mean(values: Floats, weights: Floats) -> float:
-    """Weighted mean; nan where nothing has a weight."""
+    """Return the weighted mean; nan where nothing has a weight."""
     total = float(weights.sum())
     return float((values * weights).sum() / total) if total else NAN

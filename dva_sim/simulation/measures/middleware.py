@@ -117,7 +117,7 @@ def picture_row(taken: Floats, shown: Floats, window: Window) -> Row:
 
 
 def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
-    """A row of the run, and one of each command and picture."""
+    """Return a row of the run, and one of each command and picture."""
     scenario = run.scenario
     window = run.window
     sent = _times(run.near, NoteKind.SENT)

@@ -101,7 +101,7 @@ FLOW_COLUMNS = (
 
 
 def tables(recording: SessionRecording) -> dict[str, list[Row]]:
-    """A row of the run, and one of each flow."""
+    """Return a row of the run, and one of each flow."""
     scenario, contest, trial = recording
     row = contest_row(scenario, contest) | {name: trial[name] for name in _DRIVEN}
     row["simulated_s"] = contest.until + float(trial["trial_time_s"])
@@ -109,7 +109,7 @@ def tables(recording: SessionRecording) -> dict[str, list[Row]]:
 
 
 def contest_row(config: ContestConfig, contest: Contest) -> Row:
-    """Everything that is measured of the network."""
+    """Return everything that is measured of the network."""
     commands = _counted(contest, contest.commands)
     pictures = _counted(contest, contest.pictures)
     row = _command_row(contest, *commands) | _picture_row(contest, *pictures)
@@ -132,7 +132,7 @@ def contest_row(config: ContestConfig, contest: Contest) -> Row:
 
 
 def flow_rows(contest: Contest) -> list[Row]:
-    """The rate of each flow in each direction [bit/s]."""
+    """Return the rate of each flow in each direction [bit/s]."""
     per_byte = 8.0 / (contest.until - contest.since)
     rows = []
     for way in WAYS:
@@ -183,6 +183,6 @@ def _picture_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArra
 
 # --- rates -------------------------------------------------------------------------------
 def jain(rates: Sequence[float]) -> float:
-    """Jain's index of fairness; nan if there is nothing to share."""
+    """Return Jain's index of fairness; nan if there is nothing to share."""
     squares = sum(rate * rate for rate in rates)
     return sum(rates) ** 2 / (len(rates) * squares) if squares else math.nan

@@ -159,7 +159,7 @@ RESPONDER_COLUMNS = (
 
 
 def measures_of(scenario: TimedScenario) -> tuple[str, ...]:
-    """The measures that a run of a scenario holds: nothing is contained that need not be."""
+    """Return the measures that a run of a scenario holds: nothing is contained that need not be."""
     gone = () if scenario.dispatch.containment else _OF_CONTAINMENT
     return names_of(column for column in RUN_COLUMNS if column not in gone)
 
@@ -187,7 +187,7 @@ def tables(recording: TimedRecording, follow: float = FOLLOW_S) -> dict[str, lis
 
 # --- events ------------------------------------------------------------------------------
 def cohort(recording: TimedRecording, follow: float = FOLLOW_S) -> Columns:
-    """The events of the cohort by column; times ending in `_s` are from the first report.
+    """Return the events of the cohort by column; times ending in `_s` are from the first report.
 
     Raises:
         ConfigError: see `tables`.
@@ -244,7 +244,7 @@ def _columns(recording: TimedRecording, raw: Columns, bounds: Floats, follow: fl
 
 
 def _open_ones(raw: Columns) -> NDArray[np.intp]:
-    """Code of each outcome; of what was not closed, that of `open`."""
+    """Return the code of each outcome; of what was not closed, that of `open`."""
     return np.where(np.isfinite(raw["closed"]), raw["outcome"], len(OUTCOMES)).astype(np.intp)
 
 
@@ -254,7 +254,7 @@ def _row(columns: Columns, place: int) -> Row:
 
 # --- their fates in time -------------------------------------------------------------------
 def fates(events: Columns) -> Incidence:
-    """Cumulative incidence of `FATES`, the first that each event met.
+    """Return the cumulative incidence of `FATES`, the first that each event met.
 
     Works on the rows of either model: it needs the columns `outcome`, `confirmation_s`,
     `closing_s` and `watched_s`.
@@ -267,7 +267,7 @@ def fates(events: Columns) -> Incidence:
 
 
 def reaching(events: Columns, column: str) -> Incidence:
-    """Cumulative incidence of getting there (cause 1) against being over without it (2).
+    """Return the cumulative incidence of getting there (cause 1) against being over without it (2).
 
     Args:
         events: Columns; those of `fates`, and `column`.
@@ -294,7 +294,7 @@ def zone_ratio(events: Columns, follow: float) -> float:
 
 # --- the run -------------------------------------------------------------------------------
 def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
-    """One row of all measures; see the head of this file."""
+    """Return one row of all measures; see the head of this file."""
     row: Row = {"follow_s": follow, "events": len(events["event_id"])}
     row["true_share"] = mean(events["is_true"])
     row |= _times(events, follow) | _fates(events, follow)
@@ -337,7 +337,7 @@ def _fates(events: Columns, follow: float) -> Row:
 
 
 def _bound(events: Columns, follow: float) -> Row:
-    """The bound, as a restricted mean as well, and how often it was none."""
+    """Return the bound, as a restricted mean as well, and how often it was none."""
     bounds = events["bound_s"]
     response = events["response_s"]
     return {
@@ -365,7 +365,7 @@ def _team(recording: TimedRecording) -> Row:
 
 
 def _exposure(recording: TimedRecording) -> Row:
-    """Time of people within danger radii, in all of the measured time.
+    """Return the time of people within danger radii, in all of the measured time.
 
     `exposure_s` is the sum per event, of which `exposure_look_s` comes from finding out (way,
     look and leaving) and the rest from containing; `exposure_max_s_per_h` is that of the person

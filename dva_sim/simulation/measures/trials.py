@@ -90,7 +90,7 @@ _SHARES = {
 
 
 def _of_block(column: Measure) -> Measure:
-    """The column of the run that a column of its trials becomes."""
+    """Return the column of the run that a column of its trials becomes."""
     mean = replace(column, meaning=f"{column.meaning}; mean over trials")
     return _SHARES.get(column.name, mean)
 
@@ -142,7 +142,7 @@ _OF_DEVICES = {
 
 
 def measures_of(scenario: TaskScenario) -> tuple[str, ...]:
-    """The measures that a run of a scenario holds, by its task and device."""
+    """Return the measures that a run of a scenario holds, by its task and device."""
     task = scenario.task.kind
     device = scenario.device.kind
     return tuple(
@@ -153,7 +153,7 @@ def measures_of(scenario: TaskScenario) -> tuple[str, ...]:
 
 
 def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
-    """The means over all trials, and what is measured of them together.
+    """Return the means over all trials, and what is measured of them together.
 
     `throughput_bps` is the mean over conditions of the nominal throughput, and
     `effective_throughput_bps` of that with effective width and amplitude, over the trials that
@@ -181,7 +181,7 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
 
 
 def finite_mean(values: Iterable[float]) -> float:
-    """nan of nothing."""
+    """Return nan of nothing."""
     finite = [float(value) for value in values if math.isfinite(value)]
     return sum(finite) / len(finite) if finite else math.nan
 

@@ -103,7 +103,7 @@ def most_at_once(spans: Iterable[Span]) -> int:
 
 
 def in_hand(log: DriveLog, end: float) -> Span:
-    """From the order until the operator is done with it, or the run ends at `end` [s]."""
+    """Return from the order until the operator is done with it, or the run ends at `end` [s]."""
     return log.ordered, end if log.ended is None else log.ended
 
 
@@ -286,7 +286,7 @@ def judgement(recording: Recording, log: DriveLog) -> str:
 
 # --- rows --------------------------------------------------------------------------------------
 def operator_rows(recording: Recording) -> list[Row]:
-    """One row per operator, simulated or a person who has driven."""
+    """Return one row per operator, simulated or a person who has driven."""
     numbers = range(1, recording.scenario.operator.count + 1)
     ids = [id_of("operator", n) for n in numbers if n not in recording.persons]
     ids += sorted({log.operator for log in recording.recorder.drives}.difference(ids))

@@ -83,7 +83,7 @@ class MiddlewareScenario(Config):
 def build(
     source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> MiddlewareScenario:
-    """A scenario from a file or plain data, with some keys changed.
+    """Return a scenario from a file or plain data, with some keys changed.
 
     Args:
         source: Document, whose mistakes are reported with their place, or plain data.

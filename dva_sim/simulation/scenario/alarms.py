@@ -20,13 +20,13 @@ FITS_M = 0.4  # radius that must fit where an event is, so that a robot can get 
 
 
 def table_of(scenario: Scenario) -> EventTableConfig | None:
-    """The table that a scenario has in place of a list of events, until it is expanded."""
+    """Return the table that a scenario has in place of a list of events, until it is expanded."""
     events = cast(Any, scenario.events)
     return events if isinstance(events, EventTableConfig) else None
 
 
 def with_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> Scenario:
-    """The scenario with the alarms of its table.
+    """Return the scenario with the alarms of its table.
 
     Raises:
         ConfigError: see `read_events`.

@@ -20,7 +20,7 @@ _PROFILES: dict[str, type[Config]] = {
 
 
 def all_assumptions() -> list[Assumption]:
-    """Traits of operators first, then all habits and parts, in the order of a scenario."""
+    """Return traits of operators first, then all habits and parts, in the order of a scenario."""
     of_persons = [
         each
         for whose, model in _PROFILES.items()
@@ -30,12 +30,12 @@ def all_assumptions() -> list[Assumption]:
 
 
 def as_json() -> list[dict[str, object]]:
-    """The list for other programs."""
+    """Return the list for other programs."""
     return [{**vars(each), "unit": each.unit} for each in all_assumptions()]
 
 
 def lines() -> Iterator[str]:
-    """The list for people, one line for each number."""
+    """Yield the list for people, one line for each number."""
     for group, members in groupby(all_assumptions(), lambda each: each.key.rpartition(".")[0]):
         yield group
         for each in members:

@@ -397,5 +397,5 @@ class _Reader:
 
 
 def _plain(word: str) -> str:
-    """A word without capitals, and with one kind of joint: `Gas leak` is `gas_leak`."""
+    """Return a word without capitals, and with one kind of joint: `Gas leak` is `gas_leak`."""
     return "_".join(word.casefold().replace("-", " ").replace("_", " ").split())

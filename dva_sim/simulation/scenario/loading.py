@@ -65,7 +65,7 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
 
 
 def _locate_table(events: dict[str, Any], folders: Sequence[Path]) -> None:
-    """A table lies beside the scenario that names it, or in the working folder."""
+    """Locate a table beside the scenario that names it, or in the working folder."""
     table = events.get("table")
     if isinstance(table, str):
         beside = (folder / table for folder in folders)
@@ -73,7 +73,7 @@ def _locate_table(events: dict[str, Any], folders: Sequence[Path]) -> None:
 
 
 def _locate_instructions(named: object, folders: Sequence[Path]) -> None:
-    """A file of instructions lies beside the scenario that names it, or in the working folder."""
+    """Locate instructions beside the scenario that names them, or in the working folder."""
     if not isinstance(named, dict):
         return
     for kind, file in named.items():
@@ -190,7 +190,7 @@ def _pattern_key(problem: ConfigError) -> KeyPath:
 
 
 def _place(problem: ConfigError, part: str, key: str, options: str) -> KeyPath:
-    """Key for reporting a problem: the option that it mentions, or the name."""
+    """Return the key for reporting a problem: the option that it mentions, or the name."""
     found = _OPTION.search(problem.problem)
     return (part, options, found[1]) if found else (part, key)
 
@@ -210,7 +210,7 @@ def load(name: str, base: Path | None = None) -> Document:
 def build(
     source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> Scenario:
-    """A scenario from a file or plain data, with some keys changed.
+    """Return a scenario from a file or plain data, with some keys changed.
 
     Args:
         source: Document, whose mistakes are reported with their place, or plain data.
@@ -223,7 +223,7 @@ def build(
 
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:
-    """With what follows from the profiles; refuses what does not go together."""
+    """Return it with what follows from the profiles; refuse what does not go together."""
     if (table := table_of(scenario)) is not None:
         scenario = with_events(scenario, table, error)
     check_names(scenario, error)

@@ -60,11 +60,11 @@ class TunnelGoal(Goal):
         self._time = 0.0
 
     def target(self, now: float) -> Pair:
-        """The end of the tunnel."""
+        """Return the end of the tunnel."""
         return (0.0, 0.0) if self._radius else (self.length, 0.0)
 
     def place(self, x: float, y: float) -> tuple[float, float, Pair]:
-        """Way along the middle [m], offset to its left [m], direction there."""
+        """Return the way along the middle [m], offset to its left [m], direction there."""
         radius = self._radius
         if not radius:
             return x, y, (1.0, 0.0)
@@ -83,7 +83,7 @@ class TunnelGoal(Goal):
         return self._along >= self.length or (self._task.on_error == "over" and not inside)
 
     def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
-        """The machine helps sideways; the way along the tunnel stays the person's."""
+        """Return the machine's help sideways; the way along the tunnel stays the person's."""
         _, offset, (tx, ty) = self.place(at.x, at.y)
         forward = wanted[0] * tx + wanted[1] * ty
         aside = wanted[1] * tx - wanted[0] * ty
@@ -107,7 +107,7 @@ class TunnelGoal(Goal):
         trace.touched += self._kept.touched
 
     def _way(self) -> Floats:
-        """The middle, going on after the end as before it: nobody has to stop there."""
+        """Return the middle, going on after the end as before it: nobody has to stop there."""
         if not self._radius:
             return np.array([(0.0, 0.0), (self.length + RUN_OUT, 0.0)])
         ring = self._line(0.0)
@@ -115,7 +115,7 @@ class TunnelGoal(Goal):
         return np.concatenate([ring, *[ring[1:]] * (laps - 1)])
 
     def _line(self, aside: float) -> Floats:
-        """A line beside the middle, to its right [m]."""
+        """Return a line beside the middle, to its right [m]."""
         if not self._radius:
             return np.array([(0.0, -aside), (self.length, -aside)])
         angles = np.linspace(-0.5 * math.pi, 1.5 * math.pi, CORNERS + 1)
@@ -147,7 +147,7 @@ def play(scenario: TaskScenario, seed: int, recording: RecordedDelays | None = N
 
 
 def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, Trace]:
-    """Row and trace of one of the trials that are kept, to be drawn."""
+    """Return the row and trace of one of the trials that are kept, to be drawn."""
     for index, (row, trace) in enumerate(_play(scenario, seed, drawn=number)):
         if index == number:
             return row, trace
@@ -276,7 +276,7 @@ def _goal(
 def _row(
     trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, kept: int
 ) -> Row:
-    """The measures of a trial, with what tells it from the others."""
+    """Return the measures of a trial, with what tells it from the others."""
     goal = trial.row() if isinstance(trial, DriveTrial) else trial.goal.row(trial)
     names = NAMES[trial.scenario.task.kind]
     return {

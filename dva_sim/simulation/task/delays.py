@@ -49,7 +49,7 @@ class Channel(Generic[T]):
             self._queue.append((arrival + self._extra, item))
 
     def take(self, now: float) -> list[T]:
-        """Everything that has arrived by `now` [s], oldest first."""
+        """Return everything that has arrived by `now` [s], oldest first."""
         queue = self._queue
         due = now + EARLY
         if not queue or queue[0][0] > due:
@@ -61,7 +61,7 @@ class Channel(Generic[T]):
 
 
 def normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
-    """Standard normal numbers without end, drawn in blocks."""
+    """Yield standard normal numbers without end, drawn in blocks."""
     while True:
         yield from rng.normal(size=block).tolist()
 

@@ -52,11 +52,11 @@ class HandDevice(ABC):
         self._aim = self._last = (0.0, 0.0)
 
     def aim(self, vx: float, vy: float) -> None:
-        """From now on the person wants this velocity of the cursor [m/s]."""
+        """Aim at this velocity of the cursor [m/s] from now on."""
         self._aim = vx / self._gain, vy / self._gain
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
-        """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
+        """Return the machine's velocity [m/s] for a step, given what has arrived, if anything."""
         gain = self._gain
         x, y = self._last
         if self.is_place:
@@ -231,7 +231,7 @@ KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], HandDevice]] =
 
 
 def make_device(config: DeviceConfig, person: Person, streams: Streams, dt: float) -> HandDevice:
-    """The device of a trial, in a person's hand.
+    """Return the device of a trial, in a person's hand.
 
     Args:
         config: Kind of device, and its gain.

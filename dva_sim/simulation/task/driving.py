@@ -41,7 +41,7 @@ Points = list[Pair]
 
 
 def way_of(task: Task, first: float, width: float) -> Points:
-    """The middle of the way that a vehicle has to take, from (0, 0) along x at first [m].
+    """Return the middle of the way that a vehicle has to take, from (0, 0) along x at first [m].
 
     Args:
         task: A corner, slalom or course.
@@ -62,7 +62,7 @@ def way_of(task: Task, first: float, width: float) -> Points:
 
 
 def extended(points: Points, by: float) -> Route:
-    """The way, going straight on after its end [m]."""
+    """Return the way, going straight on after its end [m]."""
     (ax, ay), (bx, by_) = points[-2:]
     step = math.dist((ax, ay), (bx, by_))
     on = bx + by * (bx - ax) / step, by_ + by * (by_ - ay) / step
@@ -141,7 +141,7 @@ class DriveTrial(Trial[Observation]):
         self.intended(now, intent.speed, intent.turn_rate)
 
     def _held(self, intent: Intent) -> float:
-        """Deflection for the speed, as a share of a full one."""
+        """Return the deflection for the speed, as a share of a full one."""
         return intent.speed / self._top[0]
 
     def _motion(self, seen: Observation) -> Pair:
@@ -172,7 +172,7 @@ class DriveTrial(Trial[Observation]):
         self.over = ahead.remaining <= RUN_OUT
 
     def _corrected(self, share: float, wanted: Intent) -> Intent:
-        """The machine helps to steer (pure pursuit); the speed stays the person's."""
+        """Return the machine helps to steer (pure pursuit); the speed stays the person's."""
         at = self.plant
         ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
         own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
@@ -230,18 +230,18 @@ class HeadingTrial(DriveTrial):
         self._steered: list[float] = []  # against the error, step by step
 
     def intended(self, now: float, one: float, other: float) -> None:
-        """The machine holds the speed: it tells nothing of the delay."""
+        """Do nothing: the machine holds the speed, which tells nothing of the delay."""
         super().intended(now, 0.0, other)
 
     def _held(self, intent: Intent) -> float:
-        """Nothing: only steering is in the hand, so only that is noisy."""
+        """Return nothing: only steering is in the hand, so only that is noisy."""
         return 0.0
 
     def _motion(self, seen: Observation) -> Pair:
         return 0.0, seen.turn_rate
 
     def commanded(self, dt: float) -> Pair:
-        """The machine holds the speed."""
+        """Return the speed that the machine holds."""
         _, turn = super().commanded(dt)
         self._steered.append(-self._side * self.device.reading()[1])
         return 1.0, turn
@@ -266,7 +266,7 @@ class HeadingTrial(DriveTrial):
 
 
 def beside(points: Points, aside: float) -> Points:
-    """A line to the left of another one, mitred at its corners [m]."""
+    """Return a line to the left of another one, mitred at its corners [m]."""
     steps = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(points)]
     before = [steps[0], *steps]
     after = [*steps, steps[-1]]

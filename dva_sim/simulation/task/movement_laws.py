@@ -34,14 +34,14 @@ def steering_id(length: float, width: float) -> float:
 
 
 def effective_width(ends: Sequence[float]) -> float:
-    """The width that 96 % of the end points would fill [m]; ends along the task axis [m]."""
+    """Return the width that 96 % of the end points would fill [m]; ends along the task axis [m]."""
     return WIDTH_PER_SD * float(np.std(ends, ddof=1))
 
 
 def throughput(
     amplitude: float, width: float, times: Sequence[float], ends: Sequence[float] | None = None
 ) -> float:
-    """Bits per second over the trials of one condition.
+    """Return bits per second over the trials of one condition.
 
     Args:
         amplitude: Nominal way to the target [m].
@@ -71,7 +71,7 @@ class FittedLine(NamedTuple):
 
 
 def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> FittedLine:
-    """The least-squares line through points.
+    """Return the least-squares line through points.
 
     Raises:
         ValueError: fewer than two different x.
@@ -97,7 +97,7 @@ class Crossover(NamedTuple):
 def open_loop(
     target: Floats, cursor: Floats, dt: float, frequencies: Sequence[float]
 ) -> NDArray[np.complex128]:
-    """Cursor over error at the frequencies of the forcing function.
+    """Return the cursor over error at the frequencies of the forcing function.
 
     The record must hold a whole number of periods of each, so that none leaks into another.
 

@@ -18,12 +18,12 @@ Pair = tuple[float, float]
 
 
 def keep_of(lag: float, dt: float) -> float:
-    """The share of a first-order lag [s] that a step [s] leaves."""
+    """Return the share of a first-order lag [s] that a step [s] leaves."""
     return math.exp(-dt / lag) if lag > 0.0 else 0.0
 
 
 def noise_of(person: Person, streams: Streams, dt: float) -> Iterator[Pair]:
-    """The motor noise of a trial, as a share of what the hand does, step by step."""
+    """Yield the motor noise of a trial, as a share of what the hand does, step by step."""
     keep = keep_of(person.hand_lag, dt)
     share = person.motor_noise
     first, second = (slow_noise(streams.fresh(f"hand/{axis}"), keep) for axis in "xy")
@@ -39,12 +39,12 @@ def shaken(x: float, y: float, noise: Iterator[Pair]) -> Pair:
 
 
 def clamped(value: float, limit: float) -> float:
-    """Within +-limit."""
+    """Return the value within +-limit."""
     return -limit if value < -limit else limit if value > limit else value
 
 
 def lagged(value: float, target: float, dt: float, lag: float) -> float:
-    """A step of a first-order lag [s], exact for a constant target."""
+    """Return a step of a first-order lag [s], exact for a constant target."""
     return target if lag <= 0.0 else target + (value - target) * math.exp(-dt / lag)
 
 

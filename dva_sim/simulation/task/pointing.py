@@ -62,7 +62,7 @@ class Motion:
         self._frames: deque[Places] = deque()
 
     def add(self, frame: Places) -> None:
-        """One more frame is shown."""
+        """Add one more frame."""
         frames = self._frames
         since = frame.time - SUMMED - 1e-9
         while len(frames) > 1 and frames[0].time < since:
@@ -84,7 +84,7 @@ class Motion:
 
 
 def summed_over(rate: float) -> float:
-    """The time from the first to the last frame of which a velocity is seen [s].
+    """Return the time from the first to the last frame of which a velocity is seen [s].
 
     Args:
         rate: Frames per second.
@@ -119,11 +119,11 @@ class Goal(ABC):
 
     @abstractmethod
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """The cursor is at a place [m] for `dt` [s]: is the trial over?"""
+        """Take the cursor's place [m] for `dt` [s]; return True if the trial is over."""
 
     @abstractmethod
     def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
-        """The command when a machine makes a share of the correction itself [m/s]."""
+        """Return the command when a machine makes a share of the correction itself [m/s]."""
 
     @abstractmethod
     def row(self, trial: CursorTrial) -> dict[str, Any]:
@@ -134,7 +134,7 @@ class Goal(ABC):
         """Add the geometry to a picture."""
 
     def press(self, now: float) -> None:  # noqa: B027
-        """The person presses the button; some goals are reached by that."""
+        """Press the button; some goals are reached by that."""
 
     @property
     def awaits_press(self) -> bool:
@@ -142,7 +142,7 @@ class Goal(ABC):
         return False
 
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
-        """The command with what disturbs the cursor [m/s]."""
+        """Return the command with what disturbs the cursor [m/s]."""
         return wanted
 
     def holds(self, now: float) -> bool:
@@ -192,7 +192,7 @@ class CursorTrial(Trial[Sighting]):
         self._noise = normals(streams.fresh("aims"))
 
     def sight(self) -> Sighting:
-        """Velocities are those of the last frames; see `Motion`."""
+        """Take velocities over the last frames; see `Motion`."""
         now = self.now
         x = self.plant.x
         y = self.plant.y

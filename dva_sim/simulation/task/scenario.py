@@ -191,7 +191,7 @@ class TaskScenario(Config):
 def build(
     source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> TaskScenario:
-    """A task from a file or plain data, with some keys changed.
+    """Return a task from a file or plain data, with some keys changed.
 
     Args:
         source: Document, whose mistakes are reported with their place, or plain data.

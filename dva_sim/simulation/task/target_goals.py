@@ -22,7 +22,7 @@ class ToTarget(Goal):
     """Base class of goals with a target."""
 
     def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
-        """All that is wanted here is correction: it is shared as a whole."""
+        """Return the whole of what is wanted: all of it is correction."""
         tx, ty = self.target(now)
         own = 1.0 - share
         return (
@@ -254,7 +254,7 @@ class TrackGoal(ToTarget):
         }
 
     def draw(self, trace: Trace) -> None:
-        """The target beside the cursor, over time."""
+        """Draw the target beside the cursor, over time."""
         trace.walls.append([(t, self._sum(t)) for t in trace.times])
 
 
@@ -281,7 +281,7 @@ class ReachGoal(ToTarget):
         return stop.swing_m, stop.reach_m
 
     def holds(self, now: float) -> bool:
-        """While the work is done, the tip stays."""
+        """Return True while the tip stays in the work."""
         return now < self._works_until
 
     @override

@@ -23,7 +23,7 @@ Values = Length | Several
 
 
 def values_of(given: float | tuple[float, ...]) -> tuple[float, ...]:
-    """One value or several, as several."""
+    """Return one value or several, as several."""
     return given if isinstance(given, tuple) else (given,)
 
 
@@ -66,7 +66,7 @@ class Pointing(Config):
     timed_from: Literal["target", "movement"] = "target"
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Amplitude and width [m] of each condition."""
+        """Yield the amplitude and width [m] of each condition."""
         yield from itertools.product(values_of(self.amplitude_m), values_of(self.width_m))
 
     @model_validator(mode="after")
@@ -97,7 +97,7 @@ class Tunnel(Config):
     on_error: Literal["counted", "over"] = "counted"
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Length and width [m] of each condition."""
+        """Yield the length and width [m] of each condition."""
         yield from itertools.product(values_of(self.length_m), values_of(self.width_m))
 
     @model_validator(mode="after")
@@ -131,7 +131,7 @@ class Tracking(Config):
     moves: Literal["target", "cursor"] = "target"
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """One: the largest excursion and the highest frequency."""
+        """Yield one: the largest excursion and the highest frequency."""
         yield sum(self.amplitudes_m), max(self.frequencies_rad_s)
 
     @property
@@ -164,7 +164,7 @@ class Corner(Config):
     width_m: Values = 1.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Length and width [m] of each condition."""
+        """Yield the length and width [m] of each condition."""
         for leg, width in itertools.product(values_of(self.leg_m), values_of(self.width_m)):
             yield 2.0 * leg, width
 
@@ -186,7 +186,7 @@ class Slalom(Config):
     width_m: Values = 1.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Spacing and width [m] of each condition."""
+        """Yield the spacing and width [m] of each condition."""
         yield from itertools.product(values_of(self.spacing_m), values_of(self.width_m))
 
     @model_validator(mode="after")
@@ -213,7 +213,7 @@ class Course(Config):
     width_m: Values = 1.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Length and width [m] of each condition."""
+        """Yield the length and width [m] of each condition."""
         steps = itertools.pairwise(self.points_m)
         length = sum(math.dist(a, b) for a, b in steps)
         for width in values_of(self.width_m):
@@ -244,7 +244,7 @@ class HeadingStep(Config):
     watched_s: Annotated[float, Field(gt=0, le=60)] = 2.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Error [deg] and width [m] of each condition."""
+        """Yield the error [deg] and width [m] of each condition."""
         for error in values_of(self.error_deg):
             yield error, self.width_m
 
@@ -278,7 +278,7 @@ class ReachTask(Config):
     settle_s: NonNegative = 0.3
 
     def conditions(self) -> Iterator[tuple[float, float]]:
-        """Whole way and width of a target [m] of each condition."""
+        """Yield the whole way and width of a target [m] of each condition."""
         places = [(0.0, 0.0), *((stop.swing_m, stop.reach_m) for stop in self.stops)]
         way = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
         for tolerance in values_of(self.tolerance_m):

@@ -52,7 +52,7 @@ class Seat:
     timing: Timing | None = None
 
     def judged_delay(self, now: float) -> float:
-        """The delay as it is judged at a moment [s]: what is new of it is misjudged."""
+        """Return the delay as it is judged at a moment [s]: what is new of it is misjudged."""
         value = self.delay.value
         usual = self.person.usual_delay
         return value if self.timing is None else self.timing.judged(value, usual, now)
@@ -93,7 +93,7 @@ class Waits:
         self._since: float | None = None
 
     def note(self, now: float, moves: bool) -> None:
-        """From `now` [s] on the person wants to move something, or wants it to stand."""
+        """Note what the person wants to move, or to stand, from `now` [s] on."""
         if moves:
             if self._since is not None and now - self._since >= WAIT_FROM:
                 self.count += 1
@@ -122,7 +122,7 @@ class WayKept:
         self.touched: list[Pair] = []
 
     def note(self, offset: float, place: Pair, dt: float) -> bool:
-        """So far from the middle [m] for a step [s]; whether that is inside."""
+        """Note a distance from the middle [m] for a step [s]; return whether that is inside."""
         self._squares += offset * offset * dt
         inside = abs(offset) <= self._limit
         if self._inside and not inside:
@@ -198,7 +198,7 @@ class Trial(ABC, Generic[S]):
 
     @abstractmethod
     def decide(self, driver: Driver, seen: S, now: float) -> None:
-        """A frame is perceived: want something; `now` is the person's clock [s]."""
+        """Decide on a perceived frame; `now` is the person's clock [s]."""
 
     @abstractmethod
     def advance(self, dt: float) -> None:
@@ -230,7 +230,7 @@ class Trial(ABC, Generic[S]):
         self.waits.note(self.now, moves=True)
 
     def intended(self, now: float, one: float, other: float) -> None:
-        """The person wants this from now on: the delay is learnt from it, and waits are counted."""
+        """Note what the person wants: the delay is learnt from it, and waits are counted."""
         self.seat.delay.intend(now, one, other)
         moves = one != 0.0 or other != 0.0
         if moves and self.first_move is None:

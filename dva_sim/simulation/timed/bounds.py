@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 def evenness(amounts: ArrayLike) -> float:
-    """Jain's index of fairness: 1 if all have the same, 1 / n if one has everything.
+    """Return Jain's index of fairness: 1 if all have the same, 1 / n if one has everything.
 
     Nan where there is nothing to share, or nobody.
 
@@ -41,7 +41,7 @@ def evenness(amounts: ArrayLike) -> float:
 
 
 def response_bounds(recording: TimedRecording) -> Floats:
-    """The bound of each event of a run [s], in the order of its rows, shape `(n,)`."""
+    """Return the bound of each event of a run [s], in the order of its rows, shape `(n,)`."""
     scenario = recording.scenario
     shift = Shift(scenario, recording.seed, load_policy("min_eta"))
     stations = list(shift.stations.values())
@@ -55,7 +55,7 @@ def response_bounds(recording: TimedRecording) -> Floats:
 
 
 def _incident(shift: Shift, stream: int, index: int) -> Incident:
-    """An incident again, as far as its way matters."""
+    """Return an incident again, as far as its way matters."""
     draws = shift.demand.draws[stream]
     kind = shift.scenario.demand[stream].kind
     place = draws.place(index)

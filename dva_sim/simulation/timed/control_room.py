@@ -83,7 +83,7 @@ def travel(
 
 
 def place_of(terrain: Terrain, where: Point | str, number: int = 1) -> Place:
-    """The place that a scenario names."""
+    """Return the place that a scenario names."""
     return terrain.named(where, number) if isinstance(where, str) else terrain.fix(*where)
 
 
@@ -93,7 +93,7 @@ def stations(scenario: TimedScenario, terrain: Terrain) -> dict[str, Place]:
 
 
 def ground_of(shift: Team) -> SiteKnowledge:
-    """Lists and stations as the core wants them."""
+    """Return lists and stations as the core wants them."""
     places = shift.stations
     return SiteKnowledge(
         preference=_preference(shift) if shift.scenario.dispatch.preferences else None,
@@ -104,7 +104,7 @@ def ground_of(shift: Team) -> SiteKnowledge:
 
 
 def _reach(shift: Team, places: list[Place]) -> Floats:
-    """From each station to each zone for a guard on its way: the mean over the zone's places."""
+    """Return times from stations to zones for a guard on its way: means over places."""
     terrain = shift.terrain
     speeds = [u.group.speed_mps for u in shift.units if u.kind == "guard"]
     speed = sum(speeds) / len(speeds) if speeds else 1.0
@@ -116,7 +116,7 @@ def _reach(shift: Team, places: list[Place]) -> Floats:
 
 
 def _preference(shift: Team) -> Callable[[m.Position, Sequence[str]], Sequence[float]]:
-    """Ranks on the list of an event's zone; outside all zones the order of registration."""
+    """Return ranks on the list of an event's zone; outside all zones the order of registration."""
     devices = {unit.name: unit.device for unit in shift.units}
     everybody = {unit.device: float(unit.number) for unit in shift.units}
     lists = {
@@ -168,12 +168,12 @@ TYPES = {"guard": GUARD, "robot": ROBOT}
 
 
 def id_of(kind: str, number: int) -> str:
-    """The id of a device of a kind by its number."""
+    """Return the id of a device of a kind by its number."""
     return f"02:00:01:{IDS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
 
 
 def hire(shift: Team, streams: Streams, stations: dict[str, Place]) -> list[Unit]:
-    """All responders, in the scenario's order."""
+    """Return all responders, in the scenario's order."""
     of_kind: Counter[str] = Counter()
     units: list[Unit] = []
     for group in shift.scenario.responders:
@@ -245,7 +245,7 @@ def make_core(shift: Team, policy: Policy) -> Dva:
 
 
 def register(shift: Team) -> None:
-    """Everybody makes itself known; who is on duty later shows no place until then."""
+    """Register everybody; who is on duty later shows no place until then."""
     mail = shift.mail
     scenario = shift.scenario
 

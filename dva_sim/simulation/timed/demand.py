@@ -70,7 +70,7 @@ class EventDraws:
         return self._truth[index] >= self._stream.false_share
 
     def severity(self, index: int) -> float:
-        """0 to 1."""
+        """Return 0 to 1."""
         listed = self._listed(index)
         if listed is not None and listed.severity is not None:
             return listed.severity
@@ -80,7 +80,7 @@ class EventDraws:
         return severity
 
     def confidence(self, index: int) -> float:
-        """0 to 1."""
+        """Return 0 to 1."""
         listed = self._listed(index)
         if listed is None or listed.confidence is None:
             return self._stream.confidence
@@ -97,7 +97,7 @@ class EventDraws:
         return self._repeat[index]
 
     def noticed_after(self, incident: Incident) -> float:
-        """From the outbreak to the first report [s]; infinite if nobody notices."""
+        """Return the time from the outbreak to the first report [s]; infinite if nobody notices."""
         if self._stream.notice != "detectors":
             return self._notice[incident.index]
         assert isinstance(self._terrain, Rooms)
@@ -164,7 +164,7 @@ class Demand:
                     self._at(number, index, stream.batch.at_s)
 
     def closed(self, incident: Incident, now: float) -> None:
-        """An incident is over: where sources are finite, its source rests."""
+        """Close an incident: where sources are finite, its source rests."""
         sources = self._scenario.demand[incident.stream].sources
         if sources is not None:
             self._rests(incident.stream, incident.index + sources.count, now)
@@ -175,7 +175,7 @@ class Demand:
         return self._left <= 0
 
     def share(self) -> list[float]:
-        """Share of all events that each zone has in the long run, shape `(zones,)`."""
+        """Return the share of all events that each zone has in the long run, shape `(zones,)`."""
         zones = self._terrain.zones
         total = [0.0] * len(zones)
         for stream in self._scenario.demand:
@@ -250,7 +250,7 @@ class Demand:
 
 
 def _rate(stream: EventStream) -> float:
-    """Events per second, as long as nobody is late."""
+    """Return events per second, as long as nobody is late."""
     if stream.between is not None:
         return 1.0 / stream.between.mean
     if stream.sources is not None:

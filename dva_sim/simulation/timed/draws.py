@@ -67,12 +67,12 @@ class Always(Draws[T]):
 
 
 def times(streams: Streams, name: str, law: Law) -> Draws[float]:
-    """Times by a law [s]."""
+    """Return times by a law [s]."""
     if isinstance(law, Constant):
         return Always(law.mean_s)
     return Draws(streams, name, lambda rng, count: law.sample(rng, count).tolist())
 
 
 def shares(streams: Streams, name: str) -> Draws[float]:
-    """Numbers between 0 and 1, all alike."""
+    """Return numbers between 0 and 1, all alike."""
     return Draws(streams, name, lambda rng, count: rng.random(count).tolist())

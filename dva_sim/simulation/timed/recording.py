@@ -114,7 +114,7 @@ class Slices:
         self.width = (end - start) / count
 
     def of(self, time: float) -> int | None:
-        """The part that a time [s] lies in; None outside."""
+        """Return the part that a time [s] lies in; None outside."""
         if not self.start <= time <= self.end:
             return None
         return min(int((time - self.start) / self.width), self.count - 1)
@@ -137,7 +137,7 @@ class Level:
         self._last = 0.0
 
     def change(self, by: int, time: float) -> None:
-        """There are more, or fewer, from `time` [s] on."""
+        """Change how many there are from `time` [s] on."""
         if self.now:
             self.advance(time)
         self._last = time
@@ -191,7 +191,7 @@ class Ledger:
             self._rows.extend(_row(incident, event, outcome, units))
 
     def columns(self) -> dict[str, Floats | NDArray[np.int64]]:
-        """The rows by column, in the order in which the events broke out."""
+        """Return the rows by column, in the order in which the events broke out."""
         table = np.frombuffer(self._rows or array("d"), dtype=np.float64)
         table = table.reshape(-1, len(COLUMNS))
         table = table[np.argsort(table[:, 0], kind="stable")]
@@ -330,28 +330,28 @@ class TimedRecording:
         return np.asarray((detected >= since) & (detected <= until))
 
     def count(self, *outcomes: str, stream: int | None = None) -> int:
-        """Events first reported within the measured time that ended so; none named: all."""
+        """Return events first reported within the measured time that ended so; none named: all."""
         codes = [CODES[o] for o in outcomes] or list(CODES.values())
         return int(self._of(self.outcomes, stream)[..., codes].sum())
 
     def total(self, measure: str, stream: int | None = None) -> tuple[float, float, float]:
-        """Count, sum [s] and sum of squares [s^2] of one of `MEASURES`."""
+        """Return the count, sum [s] and sum of squares [s^2] of one of `MEASURES`."""
         place = MEASURES.index(measure)
         cells = self._of(self.cells, stream).reshape(-1, self.cells.shape[-1]).sum(axis=0)
         return float(cells[COUNT + place]), float(cells[SUM + place]), float(cells[SQUARES + place])
 
     def mean(self, measure: str, stream: int | None = None) -> float:
-        """Mean of one of `MEASURES` [s]; nan if there was none."""
+        """Return the mean of one of `MEASURES` [s]; nan if there was none."""
         count, total, _ = self.total(measure, stream)
         return total / count if count else math.nan
 
     def waited(self, stream: int | None = None) -> float:
-        """Share of the events somebody was sent to that had to wait for it."""
+        """Return the share of the events somebody was sent to that had to wait for it."""
         count = self.total("wait", stream)[0]
         return float(self._of(self.cells, stream)[..., WAITED].sum()) / count if count else math.nan
 
     def utilisation(self, unit: int) -> float:
-        """Share of the measured time that a responder had an order."""
+        """Return the share of the measured time that a responder had an order."""
         return self.units[unit].busy / self.duration
 
     @property

@@ -47,7 +47,7 @@ class ShiftWorld(Protocol):
         """Time to get somewhere [s]; infinite if no path exists."""
 
     def look(self, unit: Unit, incident: Incident) -> float:
-        """From arrival to being sure [s]."""
+        """Return the time from arrival to being sure [s]."""
 
     def act(self, unit: Unit, incident: Incident) -> float:
         """Return how long it takes to contain it [s]."""
@@ -56,16 +56,16 @@ class ShiftWorld(Protocol):
         """Return True if a person will be called to contain it."""
 
     def spent(self, unit: Unit, phase: str, since: float) -> None:
-        """A unit has been at something until now."""
+        """Note that a unit has been at something until now."""
 
     def freed(self, unit: Unit, job: Job) -> None:
-        """A job is over, or broken off."""
+        """Note that a job is over, or broken off."""
 
     def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
-        """A guard has been within a danger radius for so long."""
+        """Note that a guard has been within a danger radius for so long."""
 
     def moving(self, unit: Unit, moves: bool) -> None:
-        """A unit begins or ceases to move in a way that the DVA should be told of."""
+        """Note that a unit begins or ceases to move in a way that the DVA should be told of."""
 
 
 @dataclass(slots=True)
@@ -202,7 +202,7 @@ class Unit:
         return True
 
     def _stand_down(self, body: m.OrderProgress) -> bool:
-        """The order is over, says the DVA."""
+        """End an order that is over by the DVA's word."""
         job = self.job
         if job is not None and job.order.event_id == body.event_id:
             self._drop()
@@ -287,7 +287,7 @@ class Unit:
             self._turn_to(job, "stand by")
 
     def _enter(self, job: Job) -> None:
-        """From outside, wherever the growing danger has driven one, into it."""
+        """Enter from outside, wherever the growing danger has driven one."""
         self._turn_to(job, "travel")
         goal = job.incident.place
         now = self.world.clock.now
@@ -355,7 +355,7 @@ class Unit:
         self._finish(job, DONE)
 
     def _finish(self, job: Job, state: str) -> None:
-        """The order is settled, or given back."""
+        """Finish an order that is settled, or given back."""
         world = self.world
         if world.clock.now > self.since:
             world.spent(self, job.phase, self.since)
@@ -378,7 +378,7 @@ class Unit:
     # --- waiting ---------------------------------------------------------------------------
 
     def _rest(self) -> None:
-        """Nobody calls: stay, or walk back and listen."""
+        """Rest where one is, or walk back and listen: nobody calls."""
         self._leave()
         if self.group.after == "stay" or self.here() is self.base:
             self.equipped = False
@@ -457,7 +457,7 @@ class Unit:
         return ready_at
 
     def _turn_to(self, job: Job, phase: str) -> None:
-        """Another phase of the same job begins."""
+        """Turn to another phase of the same job."""
         world = self.world
         now = self.world.clock.now
         if now > self.since:

@@ -27,7 +27,7 @@ class _Nobody(Policy):
 
 
 def oracle_for(scenario: TimedScenario, seed: int) -> OraclePolicy:
-    """The best plan for a run, followed.
+    """Return the best plan for a run, followed.
 
     Raises:
         ConfigError: the run is not of the small kind that can be solved exactly.
@@ -115,7 +115,7 @@ def rehearse_timed(scenario: TimedScenario, seed: int) -> None:
 
 
 def policy_of(scenario: TimedScenario, seed: int) -> Policy:
-    """The policy that a scenario names; the oracle knows the run's own future.
+    """Return the policy that a scenario names; the oracle knows the run's own future.
 
     Raises:
         ConfigError: it cannot be made.

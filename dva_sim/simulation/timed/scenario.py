@@ -63,7 +63,7 @@ def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
 
 
 def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
-    """Names of the zones, in order."""
+    """Return names of the zones, in order."""
     if scenario.site is None:
         return list(scenario.zones) or ["area" if scenario.area else "here"]
 
@@ -107,7 +107,7 @@ def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
 
 
 def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
-    """The scenario with the alarms of its table as streams, one for each kind.
+    """Return the scenario with the alarms of its table as streams, one for each kind.
 
     Raises:
         ConfigError: see `read_events`.
@@ -437,7 +437,7 @@ class TimedScenario(WithTable):
         return "path" if self.site else "straight" if self.area else "none"
 
     def members(self, group: Group) -> list[str]:
-        """Names of a group's responders."""
+        """Return names of a group's responders."""
         if group.count == 1:
             return [group.name]
         return [f"{group.name}-{number}" for number in range(1, group.count + 1)]
@@ -510,7 +510,7 @@ class TimedScenario(WithTable):
 def build(
     source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> TimedScenario:
-    """A scenario from a file or plain data, with some keys changed.
+    """Return a scenario from a file or plain data, with some keys changed.
 
     Args:
         source: Document, whose mistakes are reported with their place, or plain data.
@@ -530,5 +530,5 @@ def _complete(scenario: TimedScenario, error: Fail) -> TimedScenario:
 
 
 def limit_of(value: float | None) -> float:
-    """A time limit [s]; none is infinite."""
+    """Return a time limit [s]; none is infinite."""
     return math.inf if value is None else value

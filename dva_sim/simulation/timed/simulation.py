@@ -50,7 +50,7 @@ def check(shift: Shift) -> None:
 
 
 def _conservation(shift: Shift) -> Iterator[str]:
-    """S6: the counts add up, here and in the book, and both know the same open events."""
+    """Yield S6: the counts add up, here and in the book, and both know the same open events."""
     held = sum(len(incidents) for incidents in shift.events.values())
     if shift.total != len(shift.unnoticed) + held + sum(shift.settled.values()):
         yield "an event of the world is lost"
@@ -64,7 +64,7 @@ def _conservation(shift: Shift) -> Iterator[str]:
 
 
 def _limits(shift: Shift) -> Iterator[str]:
-    """Nothing waits beyond its deadline, and no more than may wait."""
+    """Yield breaches: something waits beyond its deadline, or more than may wait."""
     rules = shift.core.orders.rules
     now = shift.clock.now
     events = shift.core.events
@@ -76,7 +76,7 @@ def _limits(shift: Shift) -> Iterator[str]:
 
 
 def _team(shift: Shift) -> Iterator[str]:
-    """One event per responder and one responder per event, as the DVA believes it to be."""
+    """Yield one event per responder and one responder per event, as the DVA believes it to be."""
     engaged = shift.core.orders.engaged
     for unit in shift.units:
         job = unit.job
@@ -281,7 +281,7 @@ class Shift:
                 self._reported(about, event)
 
     def _reported(self, incident: Incident, event: Event) -> None:
-        """Now it is known as what the DVA knows an incident."""
+        """Note as what the DVA knows an incident."""
         incident.event = event
         self.reports[event.number] = event.reports
         del self.unnoticed[incident.number]
@@ -314,7 +314,7 @@ class Shift:
             self._settle(incident, event.state.value, now)
 
     def _settle(self, incident: Incident, outcome: str, now: float) -> None:
-        """An incident is closed: count it, and let its source make the next."""
+        """Settle a closed incident: count it, and let its source make the next."""
         self.unnoticed.pop(incident.number, None)
         self.settled[outcome] += 1
         if incident.event is not None and not in_order(incident):
@@ -324,7 +324,7 @@ class Shift:
         self.demand.closed(incident, now)
 
     def _tell_who_moves(self) -> None:
-        """Before each decision the DVA hears where those are who move and may be called."""
+        """Tell the DVA before each decision where those are who move and may be called."""
         for unit in self._moving:
             self._publish(unit, unit.here(), "walking")
 
@@ -399,7 +399,7 @@ class Shift:
         return self._drawn("act", law, incident)
 
     def _drawn(self, purpose: str, law: Law, incident: Occurrence, whose: str = "") -> float:
-        """Draws by the event's index; two laws for one purpose share their random numbers."""
+        """Return a draw by the event's index; two laws for one purpose share random numbers."""
         key = purpose, incident.stream, whose, id(law)
         draws = self._draws.get(key)
         if draws is None:
@@ -418,13 +418,13 @@ class Shift:
         )
 
     def spent(self, unit: Unit, phase: str, since: float) -> None:
-        """A unit has been at something until now; what lies in the measured time counts."""
+        """Note that a unit was at something until now; what lies in the measured time counts."""
         seconds = self._measured(since)
         if seconds > 0.0:
             self.records[unit.number].spent[phase] += seconds
 
     def freed(self, unit: Unit, job: Job) -> None:
-        """A job is over: so is the work of the operator who drove."""
+        """Note that a job is over: so is the work of the operator who drove."""
         if unit.kind == "robot":
             self.driven[job.voice] += self._measured(job.begun)
 
@@ -432,7 +432,7 @@ class Shift:
         return max(0.0, min(self.clock.now, self.slices.end) - max(since, self.slices.start))
 
     def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
-        """A guard has been within a danger radius for so long."""
+        """Note that a guard has been within a danger radius for so long."""
         if seconds > 0.0 and self.slices.of(self.clock.now) is not None:
             self.records[unit.number].exposure[stage] += seconds
 

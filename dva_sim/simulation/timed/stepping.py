@@ -73,14 +73,14 @@ class SteppedShift:
         return [unit.device for unit in self._shift.units]
 
     def new_events(self) -> list[Event]:
-        """Events that were reported since this was asked last, as the DVA knows them."""
+        """Return events that were reported since this was asked last, as the DVA knows them."""
         events = self._shift.core.events
         first = self._known + 1
         self._known = events.total
         return [e for number in range(first, events.total + 1) if (e := events.get(number))]
 
     def advise(self, advice: Sequence[Advice]) -> Situation | None:
-        """Answer, and let time pass until the DVA asks again; None: the shift is over.
+        """Return the answer, and let time pass until the DVA asks again; None: the shift is over.
 
         Raises:
             RuntimeError: it is over already, or was closed.

@@ -89,11 +89,11 @@ class Terrain:
     # --- places ------------------------------------------------------------------------
 
     def place(self, x: float, y: float, zone: int = -1) -> Place:
-        """A place at a point [m]."""
+        """Return a place at a point [m]."""
         return Place(x, y, m.Position(*self.frame.to_latlon(x, y)), zone)
 
     def fix(self, x: float, y: float, zone: int = -1) -> Place:
-        """A place that stays, such as a base."""
+        """Return a place that stays, such as a base."""
         place = self.place(x, y, zone)
         place.fixed = place
         self._known[place.position] = place
@@ -104,12 +104,12 @@ class Terrain:
         return self._known.setdefault(place.position, place)
 
     def forget(self, place: Place) -> None:
-        """The place plays no part any more."""
+        """Forget a place that plays no part any more."""
         if self._known.get(place.position) is place and place.fixed is not place:
             del self._known[place.position]
 
     def known_at(self, position: m.Position) -> Place:
-        """The place that a message speaks of."""
+        """Return the place that a message speaks of."""
         known = self._known.get(position)
         if known is None:
             x, y = self.frame.to_xy(position.latitude, position.longitude)
@@ -126,7 +126,7 @@ class Terrain:
         return self.apart(self._known_at_point(x, y, number))
 
     def _known_at_point(self, x: float, y: float, zone: int) -> Place:
-        """A place that stays, so that ways to it are planned once."""
+        """Return a place that stays, so that ways to it are planned once."""
         place = self._points.get((x, y))
         if place is None:
             place = self._points[x, y] = self.fix(x, y, zone)
@@ -140,7 +140,7 @@ class Terrain:
         return Place(place.x, place.y, position, place.zone, place.fixed)
 
     def named(self, name: str, number: int) -> Place:
-        """A base or station by name; the `number`-th that asks gets the `number`-th post.
+        """Return a base or station by name; the `number`-th that asks gets the `number`-th post.
 
         Raises:
             ConfigError: there is no such place.
@@ -150,7 +150,7 @@ class Terrain:
         raise ConfigError(unknown("place", name, self.zones, "zones"))
 
     def centre(self, zone: int) -> Place:
-        """A place that stands for a zone."""
+        """Return a place that stands for a zone."""
         return self._middle(zone)
 
     def anywhere(self, rng: np.random.Generator) -> Place:
@@ -162,7 +162,7 @@ class Terrain:
         return None
 
     def spots(self, zone: int) -> list[Place]:
-        """Places that a zone is known by: what is far from them is far from the zone."""
+        """Return places that a zone is known by: what is far from them is far from the zone."""
         return [self.centre(zone)]
 
     def origin(self) -> Place:
@@ -181,13 +181,13 @@ class Terrain:
         return place
 
     def size(self, zone: int) -> float:
-        """Weight of a zone among others where events may happen anywhere."""
+        """Return the weight of a zone among others where events may happen anywhere."""
         return 1.0
 
     # --- ways --------------------------------------------------------------------------
 
     def length(self, a: Place, b: Place) -> float:
-        """Length of the way [m]; infinite if there is none."""
+        """Return the length of the way [m]; infinite if there is none."""
         return 0.0
 
     def along(self, a: Place, b: Place, gone: float) -> Place:
@@ -275,7 +275,7 @@ class Plane(Terrain):
 
 
 def terrain_of(scenario: TimedScenario) -> Terrain:
-    """The ground that a scenario plays on.
+    """Return the ground that a scenario plays on.
 
     Raises:
         ConfigError: a site that cannot be read.
@@ -304,7 +304,7 @@ class _Ways:
         self._paths: dict[tuple[Point, Point], Floats | None] = {}
 
     def length(self, a: Point, b: Point) -> float:
-        """The way is as long there as back [m]."""
+        """Return the way, which is as long there as back [m]."""
         pair = (a, b) if a <= b else (b, a)
         length = self._lengths.get(pair)
         if length is None:
@@ -312,7 +312,7 @@ class _Ways:
         return length
 
     def path(self, a: Point, b: Point) -> Floats | None:
-        """The way itself: who is under way is asked again and again where it is."""
+        """Return the way itself: who is under way is asked again and again where it is."""
         if (a, b) not in self._paths:
             if len(self._paths) >= MOST_PATHS:
                 self._paths.clear()
@@ -338,7 +338,7 @@ def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
 
 @lru_cache(maxsize=8)
 def _passages_of(site: Site) -> tuple[Point, ...]:
-    """Middles of doors, and of where two rooms are open to each other."""
+    """Return middles of doors, and of where two rooms are open to each other."""
     import shapely
 
     walls = shapely.MultiLineString(site.walls.reshape(-1, 2, 2).tolist()).buffer(WALL)
@@ -357,7 +357,7 @@ def _passages_of(site: Site) -> tuple[Point, ...]:
 
 @lru_cache(maxsize=4096)
 def _detected_after(site: Site, kind: str, point: Point) -> float:
-    """Events happen at the same few spots again and again: once per process."""
+    """Return events happen at the same few spots again and again: once per process."""
     return min(FOUND, first_detection(make_hazard(kind, point, 0.0), site)[1])
 
 
@@ -489,5 +489,5 @@ class Rooms(Terrain):
             raise ConfigError(f"site {self.site.name!r} has no {detectors[0]} detectors")
 
     def detected_after(self, kind: str, place: Place) -> float:
-        """From the outbreak to the first detector, or somebody, that notices it [s]."""
+        """Return the time from the outbreak to the first detector, or person, that notices [s]."""
         return _detected_after(self.site, kind, place.point)

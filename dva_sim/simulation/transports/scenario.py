@@ -61,7 +61,7 @@ class TransportScenario(ContestConfig):
     drive: DriveConfig
 
     def task(self) -> TaskScenario:
-        """The drive as a task, whose link is to be the recorded one.
+        """Return the drive as a task, whose link is to be the recorded one.
 
         Raises:
             ConfigError: who drives cannot be, or not with this vehicle.
@@ -83,7 +83,7 @@ class TransportScenario(ContestConfig):
 def build(
     source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> TransportScenario:
-    """A comparison from a file or plain data, with some keys changed.
+    """Return a comparison from a file or plain data, with some keys changed.
 
     Args:
         source: Document, whose mistakes are reported with their place, or plain data.
@@ -118,7 +118,7 @@ class SessionRecording(NamedTuple):
 
 
 def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording:
-    """The network first, and then one drive over what it delivers."""
+    """Return the network first, and then one drive over what it delivers."""
     contest = play(scenario, seed)
     trials = task.play(scenario.task(), seed, recording_of(scenario, contest))
     failures = sum(trial["plugin_failures"] for trial in trials)  # while practising, too

@@ -274,7 +274,7 @@ class CellVerdict:
 
 
 def judge(cell: ComparedCell) -> CellVerdict:
-    """A condition without loss, a single run under loss, or pooled ones that hardly differ."""
+    """Judge a condition without loss, one run under loss, or pooled ones that hardly differ."""
     why = reason_against(cell)
     low, high = _interval(cell) if cell.group.kind == "single" else _band(cell)
     return CellVerdict(cell, low, high, why)

@@ -203,7 +203,7 @@ def frame_points(cells: Cells) -> tuple[Floats, Floats, Floats]:
 
 
 def frame_values(cells: Cells) -> Values:
-    """The share of the time between frames that acts as delay, if times lie on one parabola."""
+    """Return the share of the frame interval that acts as delay, on one parabola of times."""
     delays, gaps, times = frame_points(cells)
     fits = [_parabola(delays + c * gaps, times) for c in _C]
     best = int(np.argmax(fits))  # the first of all if none is a number

@@ -80,7 +80,7 @@ class Floors:
         self._last = (sizes[part] - 1).astype(np.float32)
 
     def seen(self, pose: Pose, slopes: Floats) -> Colours:
-        """Colours of all pixels `(h, w)`.
+        """Return colours of all pixels `(h, w)`.
 
         Args:
             pose: Pose of the lens [m, rad].
@@ -102,7 +102,7 @@ class Floors:
         return self._colours.take(index, mode="clip")
 
     def _floor(self, site: Site) -> Bytes:
-        """Tiles in a tint of each room's colour, so that one sees oneself move."""
+        """Return tiles in a tint of each room's colour, so that one sees oneself move."""
         colours = self._tints(site)[self._rooms.numbers]
         rows, columns = self._rooms.numbers.shape
         x = self._rooms.origin[0] + (np.arange(columns) + 0.5) * self._rooms.cell
@@ -121,7 +121,7 @@ class Floors:
         return np.asarray(image)
 
     def _tints(self, site: Site) -> NDArray[np.float64]:
-        """Colour of the floor of each room, by its number `(n, 3)`."""
+        """Return the colour of the floor of each room, by its number `(n, 3)`."""
         tints = 0.55 * np.array(LINOLEUM) + 0.45 * 255 * self._rooms.palette
         rooms = tints[self._rooms.accent]
         rooms[self._rooms.outdoor] = PAVING if site.rooms else BARE_FLOOR
@@ -132,7 +132,7 @@ class Floors:
         return rooms
 
     def _ring(self, draw: Any, x: float, y: float, radius: float, colour: Any) -> None:
-        """A painted circle on the floor."""
+        """Draw a painted circle on the floor."""
         column = (x - self._rooms.origin[0]) / self._rooms.cell
         row = (y - self._rooms.origin[1]) / self._rooms.cell
         r = radius / self._rooms.cell
@@ -140,7 +140,7 @@ class Floors:
         draw.ellipse((column - r, row - r, column + r, row + r), outline=colour, width=width)
 
     def _lamps(self, site: Site) -> Bytes:
-        """A white ceiling with lamps over the rooms, the sky elsewhere."""
+        """Return a white ceiling with lamps over the rooms, the sky elsewhere."""
         rows, columns = self._rooms.numbers.shape
         image = Image.new("RGB", (columns, rows), DAYLIGHT if site.rooms else BARE_CEILING)
         draw = ImageDraw.Draw(image)
@@ -167,7 +167,7 @@ class Floors:
 
 
 def _coarser(colours: Bytes, times: int) -> Bytes:
-    """Blocks of cells in one."""
+    """Return blocks of cells in one."""
     rows = colours.shape[0] // times
     columns = colours.shape[1] // times
     blocks = colours.reshape(rows, times, columns, times, 3).mean(axis=(1, 3))

@@ -126,7 +126,7 @@ class Camera:
     # --- what stands still -------------------------------------------------------------
 
     def _draw_walls(self, walls: Hits, pose: Pose, *canvases: Any) -> None:
-        """One wall for each column, over what is there."""
+        """Draw one wall for each column, over what is there."""
         top, bottom = self._edges(walls)
         first = max(0, math.floor(top.min()))
         last = min(self.height, math.ceil(bottom.max()))
@@ -141,7 +141,7 @@ class Camera:
             np.copyto(canvas[first:last], values, where=inside)
 
     def _draw_others(self, hits: Hits, pose: Pose, *canvases: Any) -> None:
-        """Lintels, frames and solids pixel by pixel, the nearest last."""
+        """Draw lintels, frames and solids pixel by pixel, the nearest last."""
         edges = np.clip(np.round(self._edges(hits)), 0, self.height).astype(np.int32)
         count = np.maximum(edges[1] - edges[0], 0)
         which = np.repeat(np.arange(len(count)), count)
@@ -155,13 +155,13 @@ class Camera:
             canvas.reshape(-1)[pixel] = values
 
     def _edges(self, hits: Hits) -> Floats:
-        """Rows of the upper and lower edge of each hit `(2, n)` [pixels]."""
+        """Return rows of the upper and lower edge of each hit `(2, n)` [pixels]."""
         heights = np.stack([self._surfaces.high[hits.surface], self._surfaces.low[hits.surface]])
         rows = self.height / 2 + (EYE_HEIGHT - heights) * (self.focal_length / hits.depth)
         return np.asarray(rows, dtype=np.float32)
 
     def _looks(self, hits: Hits) -> tuple[Floats, Floats]:
-        """Depth and light of each hit."""
+        """Return the depth and light of each hit."""
         surfaces = self._surfaces
         # Darker towards the corners of a room, so that they show.
         gap = np.abs(hits.along[:, None] - surfaces.dark_ends[hits.surface]).min(axis=1)
@@ -186,7 +186,7 @@ class Camera:
     def _light_up(
         self, scene: Floats, depth: Floats, rays: Rays, fire: tuple[float, float], light: float
     ) -> None:
-        """Firelight in the room of the fire."""
+        """Draw firelight in the room of the fire."""
         x = depth[::2] * rays.x
         y = depth[::2] * rays.y
         x += np.float32(rays.origin[0] - fire[0])
@@ -205,7 +205,7 @@ class Camera:
     def _flood(
         self, scene: Floats, depth: Floats, rays: Rays, water: Raster, far: Floats, time: float
     ) -> None:
-        """Wet floors as mirrors."""
+        """Draw wet floors as mirrors."""
         first = self.height // 2
         x = rays.origin[0] + depth[first:] * rays.x
         y = rays.origin[1] + depth[first:] * rays.y
@@ -224,7 +224,7 @@ class Camera:
         things: Sequence[Figure | Hazard],
         time: float,
     ) -> None:
-        """Everything that stands about, the farthest first."""
+        """Add everything that stands about, the farthest first."""
         cos = math.cos(pose.heading)
         sin = math.sin(pose.heading)
         gaps = [(x - pose.x, y - pose.y) for x, y in map(_place_of, things)]
@@ -244,7 +244,7 @@ class Camera:
     def _add_sprite(
         self, scene: Floats, depth: Floats, sprite: Sprite, ahead: float, right: float
     ) -> None:
-        """One picture in the picture, where nothing nearer hides it."""
+        """Add one picture in the picture, where nothing nearer hides it."""
         scale = self.focal_length / ahead
         left = self.width / 2 + right * scale - sprite.size[0] / 2 * scale
         top = self.height / 2 + (EYE_HEIGHT - sprite.size[1]) * scale
@@ -270,7 +270,7 @@ def _place_of(thing: Figure | Hazard) -> tuple[float, float]:
 
 
 def _develop(colours: Any, light: Floats) -> Floats:
-    """Packed colours in their light, as red, green and blue `(3, h, w)`."""
+    """Return the packed colours in their light, as red, green and blue `(3, h, w)`."""
     scene = np.empty((3, *colours.shape), dtype=np.float32)
     channels = colours.astype("<u4", copy=False).view(np.uint8).reshape(*colours.shape, 4)
     for channel, plane in enumerate(scene):
@@ -288,5 +288,5 @@ def _pixels(start: float, size: float, count: int, texels: int) -> tuple[slice, 
 
 
 def _dim(depth: Floats) -> Floats:
-    """Light that is left at a depth."""
+    """Return the light that is left at a depth."""
     return np.asarray(1.0 / (1.0 + depth * (1.0 / DUSK)), dtype=np.float32)

@@ -24,7 +24,7 @@ GOLDEN = 0.61803399  # steps of the hue, so that neighbours differ
 
 
 def pack(colours: Any) -> Colours:
-    """Colours `(..., 3)`, each in one number."""
+    """Return colours `(..., 3)`, each in one number."""
     rgb = np.asarray(colours, dtype=np.uint32)
     return np.asarray(rgb[..., 0] | rgb[..., 1] << 8 | rgb[..., 2] << 16, dtype=np.uint32)
 
@@ -55,7 +55,7 @@ class RoomGrid:
         self.outdoor = np.array([True, *(room.outdoor for room in site.rooms)])
 
     def at(self, x: Any, y: Any) -> NDArray[np.uint16]:
-        """Numbers of the rooms at places, arrays of 32 bits [m]."""
+        """Return numbers of the rooms at places, arrays of 32 bits [m]."""
         rows, columns = self.numbers.shape
         scale = np.float32(1 / self.cell)
         column = (x - np.float32(self.origin[0])) * scale

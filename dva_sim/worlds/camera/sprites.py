@@ -63,7 +63,7 @@ def view_of(heading: float, bearing: float) -> str:
 
 @cache
 def person(view: str, number: int, guard: bool) -> Sprite:
-    """Somebody who stands or walks, 1.75 m tall.
+    """Return somebody who stands or walks, 1.75 m tall.
 
     Args:
         view: `front`, `back`, `left` or `right`: the side that is seen of somebody who faces
@@ -88,7 +88,7 @@ def person(view: str, number: int, guard: bool) -> Sprite:
 
 @cache
 def lying(number: int, guard: bool) -> Sprite:
-    """Somebody who lies on the floor."""
+    """Return somebody who lies on the floor."""
     up = person("right", number, guard)
     turned = np.ascontiguousarray(np.rot90(up.colours, axes=(1, 2)))
     return Sprite(turned, np.ascontiguousarray(np.rot90(up.cover)), (up.size[1], up.size[0] * 0.8))
@@ -96,7 +96,7 @@ def lying(number: int, guard: bool) -> Sprite:
 
 @cache
 def robot(view: str) -> Sprite:
-    """A service robot: a round shell on wheels with a screen on a mast, 1.3 m tall."""
+    """Return a service robot: a round shell on wheels with a screen on a mast, 1.3 m tall."""
     pen = _Pen(0.8, 1.35)
     pen.ellipse(-0.26, 0.0, -0.12, 0.14, DARK)
     pen.ellipse(0.12, 0.0, 0.26, 0.14, DARK)
@@ -124,7 +124,7 @@ def robot(view: str) -> Sprite:
 
 @cache
 def bottle() -> Sprite:
-    """A leaking gas bottle, and what comes out of it."""
+    """Return a leaking gas bottle, and what comes out of it."""
     pen = _Pen(1.0, 1.6)
     for number in range(9):
         x = 0.05 + 0.042 * number
@@ -143,7 +143,7 @@ def bottle() -> Sprite:
 
 @cache
 def flames(frame: int) -> Sprite:
-    """Tongues of fire in a box of one metre by one; scaled to the fire they belong to."""
+    """Return tongues of fire in a box of one metre by one; scaled to the fire they belong to."""
     rows = 120
     columns = 96
     y = 1.0 - (np.arange(rows)[:, None] + 0.5) / rows
@@ -244,15 +244,15 @@ class _Pen:
         return (x + self._size[0] / 2) * self._scale, (self._size[1] - y) * self._scale
 
     def box(self, x1: float, y1: float, x2: float, y2: float, colour: Any) -> None:
-        """A rectangle from its lower left to its upper right corner."""
+        """Draw a rectangle from its lower left to its upper right corner."""
         self._draw.rectangle((*self._at(x1, y2), *self._at(x2, y1)), fill=colour)
 
     def ellipse(self, x1: float, y1: float, x2: float, y2: float, colour: Any) -> None:
-        """An ellipse in such a rectangle."""
+        """Draw an ellipse in such a rectangle."""
         self._draw.ellipse((*self._at(x1, y2), *self._at(x2, y1)), fill=colour)
 
     def shape(self, corners: Any, colour: Any) -> None:
-        """A polygon."""
+        """Draw a polygon."""
         self._draw.polygon([self._at(x, y) for x, y in corners], fill=colour)
 
     def sprite(self, mirrored: bool = False) -> Sprite:

@@ -48,7 +48,7 @@ class Hits(NamedTuple):
     along: Floats
 
     def where(self, choice: NDArray[Any]) -> Hits:
-        """Some of them, by mask or by index."""
+        """Return some of them, by mask or by index."""
         return Hits(*(values[choice] for values in self))
 
 
@@ -100,7 +100,7 @@ class Surfaces:
         self._slack = np.where(self.kind == SOLID, -HANGING / 4, HANGING).astype(np.float32)
 
     def _dark_ends(self, doors: NDArray[np.float64]) -> Floats:
-        """Places of the corners along each surface; far away where there is none."""
+        """Return places of the corners along each surface; far away where there is none."""
         places = np.stack([np.zeros_like(self.length), self.length], axis=1)
         if len(doors):
             jambs = doors.reshape(-1, 1, 1, 2)
@@ -138,7 +138,7 @@ class Surfaces:
         return walls, before.where(np.argsort(-before.depth, kind="stable"))
 
     def _all_hits(self, pose: Pose, slopes: Floats) -> Hits:
-        """Every pair of a surface and a column that meets it."""
+        """Return every pair of a surface and a column that meets it."""
         cos = math.cos(pose.heading)
         sin = math.sin(pose.heading)
         turn = np.array([[cos, sin], [sin, -cos]], dtype=np.float32)  # ahead, to the right
@@ -169,7 +169,7 @@ class Surfaces:
 
 
 def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
-    """First and last column of each surface, cut off at the lens."""
+    """Return the first and last column of each surface, cut off at the lens."""
     z1, t1, z2, t2 = local.T
     dz = z2 - z1
     dt = t2 - t1
@@ -192,7 +192,7 @@ def _sides_of_solids(site: Site, walls: NDArray[np.float64]) -> NDArray[np.bool_
 
 
 def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
-    """Doors and exits: ends x1, y1, x2, y2, shape `(n, 4)` [m], and heights `(n,)` [m]."""
+    """Return doors and exits: ends x1, y1, x2, y2, shape `(n, 4)` [m], and heights `(n,)` [m]."""
     exits = [way.ends for way in site.exits]
     ends = np.vstack([np.reshape(site.doors, (-1, 4)), np.reshape(exits, (-1, 4))])
     heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
@@ -208,14 +208,14 @@ def _shut(doors: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.
 
 
 def _inset(doors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The leaves of doors, between their posts."""
+    """Return the leaves of doors, between their posts."""
     along = doors[:, 2:] - doors[:, :2]
     along = along / np.maximum(np.hypot(*along.T), 1e-6)[:, None] * POST
     return np.hstack([doors[:, :2] + along, doors[:, 2:] - along])
 
 
 def _frame(door: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Posts of a door: across its line and along it, at both ends `(4, 4)` [m]."""
+    """Return posts of a door: across its line and along it, at both ends `(4, 4)` [m]."""
     a = door[:2]
     b = door[2:]
     along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)

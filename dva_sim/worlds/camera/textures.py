@@ -65,7 +65,7 @@ class Uprights:
         self.colours: Colours = self._columns(site)
 
     def texels(self, hits: Hits, pose_xy: tuple[float, float], far: tuple[Floats, Floats]) -> Ints:
-        """First texel of the painted column of each hit.
+        """Return the first texel of the painted column of each hit.
 
         Args:
             hits: Surfaces and places on them.
@@ -91,7 +91,7 @@ class Uprights:
         return np.asarray(column * TEXELS, dtype=np.intp)
 
     def _wall_columns(self, hits: Hits, here: Any, beyond: Any) -> Ints:
-        """Panels, and windows where an outer wall has room for them."""
+        """Return panels, and windows where an outer wall has room for them."""
         accent = self._rooms.accent[here]
         length = self._surfaces.length[hits.surface]
         base = accent * (PANEL_COLUMNS + WINDOW_COLUMNS)
@@ -104,7 +104,7 @@ class Uprights:
         return np.asarray(base + np.where(glazed, PANEL_COLUMNS + window, panel))
 
     def _sign_columns(self, hits: Hits, left: Any) -> Ints:
-        """The side of a lintel that is seen, read from left to right."""
+        """Return the side of a lintel that is seen, read from left to right."""
         share = np.clip(hits.along / self._surfaces.length[hits.surface], 0, 0.999)
         # Seen from its left side, a line runs from right to left.
         share = np.where(left, 0.999 - share, share)
@@ -114,7 +114,7 @@ class Uprights:
         )
 
     def _columns(self, site: Site) -> Colours:
-        """Every painted column, `(n, TEXELS)` in one row, from the floor up."""
+        """Return every painted column, `(n, TEXELS)` in one row, from the floor up."""
         height = (np.arange(TEXELS) + 0.5) / TEXELS * self._ceiling
         parts = []
         for accent in self._rooms.palette:
@@ -142,7 +142,7 @@ class Uprights:
 
 
 def _panels(height: Any, accent: Any) -> NDArray[np.float64]:
-    """A wall: skirting, a band in the room's colour, plaster; joints between panels."""
+    """Return a wall: skirting, a band in the room's colour, plaster; joints between panels."""
     colours = np.ones((PANEL_COLUMNS, TEXELS, 1)) * np.array(PLASTER, dtype=np.float64)
     colours[:, height < 1.0] = 255 * np.asarray(accent)
     colours[:, (height >= 1.0) & (height < 1.05)] = 170 * np.asarray(accent)
@@ -152,7 +152,7 @@ def _panels(height: Any, accent: Any) -> NDArray[np.float64]:
 
 
 def _windows(height: Any, accent: Any) -> NDArray[np.float64]:
-    """An outer wall with a window in the middle of each bay."""
+    """Return an outer wall with a window in the middle of each bay."""
     wall = _panels(height, accent)
     colours = np.repeat(wall[1:2], WINDOW_COLUMNS, axis=0)
     tall = (height > 1.0) & (height < 2.2)
@@ -185,7 +185,7 @@ def _name(site: Site, point: Any) -> str:
 
 
 def _plate(text: str, size: tuple[float, float]) -> Image.Image:
-    """A sign of a size [m] with a word on it."""
+    """Return a sign of a size [m] with a word on it."""
     width, height = (round(400 * side) for side in size)
     image = Image.new("RGB", (width, height), EXIT if text == "Exit" else SIGN)
     points = 0.95 * height

@@ -37,7 +37,7 @@ class Rays(NamedTuple):
 
 
 def look_up(x: Floats, y: Floats, *rasters: Raster) -> list[Floats]:
-    """Values of rasters on the same grid at places [m]; 0 outside."""
+    """Return values of rasters on the same grid at places [m]; 0 outside."""
     xmin, xmax, ymin, ymax = rasters[0].extent
     rows, columns = rasters[0].values.shape
     # A rim of zeros around the grid takes what lies outside.

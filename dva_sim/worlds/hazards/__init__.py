@@ -61,7 +61,7 @@ PLUGINS: Final = Plugins[Hazard](
 
 
 def find_hazard(kind: str) -> type[Hazard]:
-    """The class that `kind` means.
+    """Return the class that `kind` means.
 
     Args:
         kind: A shipped kind such as `fire`, a class in a file such as `mine.py:Mine`, or the
@@ -76,7 +76,7 @@ def find_hazard(kind: str) -> type[Hazard]:
 def make_hazard(
     kind: str, position: tuple[float, float], start: float, **settings: str | float
 ) -> Hazard:
-    """A hazard at a place [m], from `start` [s] on.
+    """Return a hazard at a place [m], from `start` [s] on.
 
     Args:
         kind: See `find_hazard`.

@@ -55,7 +55,7 @@ class Mesh:
         return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(nodes, x, y, -1)))
 
     def nearest(self, x: float, y: float) -> int:
-        """The node around a point [m], or the one nearest to it."""
+        """Return the node around a point [m], or the one nearest to it."""
         node = self.node_at(x, y)
         if node < 0:
             rows, columns = np.nonzero(self.nodes >= 0)
@@ -67,7 +67,7 @@ class Mesh:
 
 @lru_cache(maxsize=8)
 def mesh_in(building: Building) -> Mesh:
-    """The mesh of all floor indoors, once per process."""
+    """Return the mesh of all floor indoors, once per process."""
     inside = (building.grid.cells == FREE) & (building.labels != NOWHERE)
     return make_mesh(building.grid, inside, side_for(inside.sum() * building.grid.resolution**2))
 
@@ -78,7 +78,7 @@ def side_for(floor: float) -> float:
 
 
 def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) -> Mesh:
-    """The mesh of some cells of a grid.
+    """Return the mesh of some cells of a grid.
 
     Args:
         grid: Grid of the cells.
@@ -113,14 +113,14 @@ def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) 
 
 
 def _edges(number: NDArray[np.int32], axis: int) -> NDArray[np.int32]:
-    """Pairs of neighbouring cells along an axis, shape `(2, k)`."""
+    """Return pairs of neighbouring cells along an axis, shape `(2, k)`."""
     low, high = (number[:-1], number[1:]) if axis == 0 else (number[:, :-1], number[:, 1:])
     both = (low >= 0) & (high >= 0)
     return np.stack([low[both], high[both]])
 
 
 def _borders(pairs: Integers, middles: Floats, count: int, block: int) -> Floats:
-    """Edges between cells put together to borders between nodes.
+    """Return edges between cells put together to borders between nodes.
 
     Args:
         pairs: Nodes on both sides of each edge, shape `(2, k)`.

@@ -102,7 +102,7 @@ class SitePoints:
 
 
 def building_of(site: Site) -> Building:
-    """The building that a site is; copies of a site share what is worked out."""
+    """Return the building that a site is; copies of a site share what is worked out."""
     return site.kept("building", lambda: _building(site))
 
 
@@ -174,7 +174,7 @@ class _Parting:
             )
 
     def _cut(self, rows: Integers, columns: Integers, area: float, ceiling: float) -> _Cut:
-        """One compartment cut across its longer side."""
+        """Return one compartment cut across its longer side."""
         first = len(self.area)
         resolution = self._site.grid.resolution
         axis = 0 if _span(rows) > _span(columns) else 1
@@ -194,11 +194,11 @@ class _Parting:
         return cut
 
     def sides(self, a: str, b: str | None, x: float, y: float) -> tuple[int, int]:
-        """The parts that an opening at a point [m] joins."""
+        """Return the parts that an opening at a point [m] joins."""
         return self._nearest(a, x, y), NOWHERE if b is None else self._nearest(b, x, y)
 
     def _nearest(self, name: str, x: float, y: float) -> int:
-        """The part of a compartment nearest to a point [m]."""
+        """Return the part of a compartment nearest to a point [m]."""
         cut = self._of[name]
         along = self._site.grid.to_cell(x, y)[cut.axis]
         return cut.first + min(max(0, int((along - cut.low) // cut.length)), cut.parts - 1)

@@ -54,7 +54,7 @@ QUANTITIES: Final = {
 
 
 def together(a: Conditions, b: Conditions) -> Conditions:
-    """The air with both hazards; gases explode together by their shares of their limits.
+    """Return the air with both hazards; gases explode together by their shares of their limits.
 
     References:
         H. Le Chatelier, Annales des Mines 19 (1891) 388: limits of mixed gases.

@@ -76,7 +76,7 @@ def toxic_rate(conditions: Conditions) -> float:
 
 
 def pace_in_smoke(extinction: float) -> float:
-    """Share of the walking speed in clean air that smoke [1/m] leaves.
+    """Return the share of the walking speed in clean air that smoke [1/m] leaves.
 
     Measured where lamps still shone, at 2 to 8 per metre: 0.706 m/s, less 0.057 m/s for each.
     """
@@ -84,5 +84,5 @@ def pace_in_smoke(extinction: float) -> float:
 
 
 def pace_in_water(depth: float) -> float:
-    """Share of the walking speed on a dry floor that water [m] leaves; assumed."""
+    """Return the share of the walking speed on a dry floor that water [m] leaves; assumed."""
     return max(WADING, 1.0 - 0.5 * depth / KNEE)

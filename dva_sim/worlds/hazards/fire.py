@@ -110,14 +110,14 @@ class Fire(Hazard):
         return self
 
     def heat_release(self, time: float) -> float:
-        """Heat release at `time` [s], in [kW]."""
+        """Return the heat release at `time` [s], in [kW]."""
         age = time - self.start
         age = age if age > 0.0 else 0.0
         heat = FULL_GROWTH_KW * (age / GROWTH_S[self.growth]) ** 2
         return heat if heat < self.peak else self._grown(age)
 
     def _grown(self, age: float) -> float:
-        """Heat release once the peak is reached [kW]."""
+        """Return the heat release once the peak is reached [kW]."""
         growing = GROWTH_S[self.growth] * math.sqrt(self.peak / FULL_GROWTH_KW)
         fuel = FIRE_LOAD * self.peak / HEAT_PER_AREA
         steady = max(0.0, DECAY_FROM * fuel / self.peak - growing / 3.0)  # growing burns a third
@@ -126,7 +126,7 @@ class Fire(Hazard):
         return self.peak * min(1.0, max(0.0, 1.0 - (age - growing - steady) / decaying))
 
     def heat_flux(self, time: float, point: Point) -> float:
-        """Radiant heat at a place [m] in free sight of the fire, in [kW/m^2].
+        """Return the radiant heat at a place [m] in free sight of the fire, in [kW/m^2].
 
         References:
             Point-source model: SFPE Handbook of Fire Protection Engineering, 5th ed., chapter 66.
@@ -187,7 +187,7 @@ NO_JET = (0.0, math.inf)  # in another room there is only the layer
 
 
 def jet_warmth(heat: Floats, distance: float, ceiling: float) -> Floats:
-    """Excess temperature of a fire's ceiling jet [K].
+    """Return excess temperature of a fire's ceiling jet [K].
 
     Args:
         heat: Heat release [kW].
@@ -218,20 +218,20 @@ def jet_lag(heat: Floats, distance: float, ceiling: float) -> Floats:
 
 
 def jet_smoke(warmth: Floats) -> Floats:
-    """Extinction in a ceiling jet [1/m]: soot is thinned on its way just as heat is."""
+    """Return the extinction in a ceiling jet [1/m]: soot is thinned on its way just as heat is."""
     soot_per_heat = SOOT_YIELD / HEAT_OF_COMBUSTION / (1.0 - RADIATIVE_FRACTION)  # [kg/kJ]
     return np.asarray(SOOT_EXTINCTION * soot_per_heat * DENSITY * HEAT_CAPACITY * warmth)
 
 
 @lru_cache(maxsize=16)
 def _burning(fire: Fire) -> tuple[Floats, Floats]:
-    """Ages [s] and the heat released then [kW]."""
+    """Return ages [s] and the heat released then [kW]."""
     ages = np.arange(1.0, LATEST)
     return ages, np.array([max(1e-6, fire.heat_release(fire.start + age)) for age in ages.tolist()])
 
 
 def smoke_in_jet(fire: Fire, distance: float, ceiling: float) -> tuple[float, float]:
-    """Age of a fire when its ceiling jet reaches a smoke detector in its room [s].
+    """Return the age of a fire when its ceiling jet reaches a smoke detector in its room [s].
 
     Returns:
         The age when any smoke is in it, and the one when the jet by itself sets it off.
@@ -244,7 +244,7 @@ def smoke_in_jet(fire: Fire, distance: float, ceiling: float) -> tuple[float, fl
 
 
 def heat_in_jet(fire: Fire, distance: float, ceiling: float) -> float:
-    """Age of a fire when its ceiling jet sets off a heat detector in its room [s]."""
+    """Return the age of a fire when its ceiling jet sets off a heat detector in its room [s]."""
     ages, heat = _burning(fire)
     warmth = jet_warmth(heat, distance, ceiling)
     share = -np.expm1(-np.sqrt(jet_speed(heat, distance, ceiling)) / RTI)  # of a second's gap
@@ -336,7 +336,7 @@ class FireField(SolvedField):
         )
 
     def layer(self, space: int, time: float) -> Layer | None:
-        """The smoke in a space; None if there is none. Who is there meets the same."""
+        """Return the smoke in a space; None if there is none. Who is there meets the same."""
         if (time, self.until) != self._layers_at:
             self._layers_at = (time, self.until)
             self._layers = {}
@@ -365,7 +365,7 @@ class FireField(SolvedField):
         )
 
     def extinctions(self, time: float, where: str = "breathing") -> Floats:
-        """Extinction in each space [1/m], and 0 last, for -1: nowhere.
+        """Return the extinction in each space [1/m], and 0 last, for -1: nowhere.
 
         Args:
             time: [s]
@@ -429,7 +429,7 @@ class FireField(SolvedField):
         return alarm_in(detector, air)._replace(reached=reached, at_latest=at_latest)
 
     def _jet_at(self, detector: str, x: float, y: float) -> tuple[float, float]:
-        """Ages at which the ceiling jet reaches a detector, and sets it off [s]."""
+        """Return ages at which the ceiling jet reaches a detector, and sets it off [s]."""
         fire = self._fire
         site = self.site
         room = site.compartment_at(*fire.position)
@@ -468,7 +468,7 @@ def _radiant(radiated: float, distance: float, radius: float) -> float:
 
 
 def _glow(temperature: float, optical_depth: float) -> float:
-    """Radiant heat of hot smoke on somebody below or in it [kW/m^2]."""
+    """Return the radiant heat of hot smoke on somebody below or in it [kW/m^2]."""
     if temperature < AMBIENT + 1.0:
         return 0.0
     kelvin = temperature + KELVIN - AMBIENT

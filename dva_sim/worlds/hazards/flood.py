@@ -54,7 +54,7 @@ class Flood(Hazard):
     inflow: Annotated[float, Field(gt=0, le=MOST_INFLOW)] = INFLOW
 
     def volume(self, time: float) -> float:
-        """Water that has come until `time` [s], in [m^3]."""
+        """Return the water that has come until `time` [s], in [m^3]."""
         return self.inflow * max(0.0, time - self.start)
 
     @override
@@ -110,11 +110,11 @@ class Filling:
         self._levels = 1.0 / (1.0 / a + 1.0 / b)  # volume per difference of levels [m^2]
 
     def dry(self) -> Floats:
-        """The water in each space and, last, what has run out [m^3]."""
+        """Return the water in each space and, last, what has run out [m^3]."""
         return np.zeros(self._spaces.count + 1)
 
     def step(self, state: Floats, age: float, dt: float) -> Floats:
-        """The state `dt` [s] later."""
+        """Return the state `dt` [s] later."""
         new = self.step_without_inflow(state, age, dt)
         new[self._room] += self._inflow * dt
         return new
@@ -138,7 +138,7 @@ class Filling:
 
 
 def over_weir(above: Floats, below: Floats, width: Floats) -> Floats:
-    """Water that flows over a broad crest [m^3/s].
+    """Return the water that flows over a broad crest [m^3/s].
 
     Args:
         above: Water over the crest on the higher side [m]; none where negative.

@@ -65,7 +65,7 @@ class Air:
         return np.zeros(len(self.mesh.area) + 1)
 
     def step(self, state: Floats, node: int, rate: float, dt: float) -> Floats:
-        """The state `dt` [s] later, with a source [m^3/s] in a node."""
+        """Return the state `dt` [s] later, with a source [m^3/s] in a node."""
         source = self.mesh.area / dt * state[:-1]
         source[node] += rate / MIXED_HEIGHT
         share = self._solver(dt).solve(source)
@@ -73,7 +73,7 @@ class Air:
         return np.append(share, state[-1] + dt * MIXED_HEIGHT * out)
 
     def _solver(self, dt: float) -> Any:
-        """The factors of a step's equations, once for each length of a step."""
+        """Return the factors of a step's equations, once for each length of a step."""
         if dt not in self._solvers:
             from scipy.sparse.linalg import splu
 
@@ -81,7 +81,7 @@ class Air:
         return self._solvers[dt]
 
     def _equations(self, dt: float) -> Any:
-        """The matrix of one implicit step."""
+        """Return the matrix of one implicit step."""
         from scipy.sparse import coo_array
 
         mesh = self.mesh
@@ -96,7 +96,7 @@ class Air:
 
 
 def _carried(spread: Floats, flow: Floats) -> Floats:
-    """Air that passes each border one way, by eddies and drift: the exponential scheme.
+    """Return air that passes each border one way, by eddies and drift: the exponential scheme.
 
     Exact for steady flow along one line; never negative.
     """
@@ -107,7 +107,7 @@ def _carried(spread: Floats, flow: Floats) -> Floats:
 
 
 def _potential_flow(mesh: Mesh, draught: Draught | None) -> Floats:
-    """Air that passes each border from a to b [m^2/s]: without whirls, and none is lost."""
+    """Return air that passes each border from a to b [m^2/s]: without whirls, and none is lost."""
     if draught is None:
         return np.zeros(len(mesh.a))
     from scipy.sparse import coo_array
@@ -133,5 +133,5 @@ def _potential_flow(mesh: Mesh, draught: Draught | None) -> Floats:
 
 @lru_cache(maxsize=8)
 def air_in(building: Building, diffusivity: float, loss: float, draught: Draught | None) -> Air:
-    """The air of a building, once per process."""
+    """Return the air of a building, once per process."""
     return Air(mesh_in(building), diffusivity, loss, draught)

@@ -213,7 +213,7 @@ class LeakField(SolvedField):
         return Conditions(gas=share, explosive=share / self._leak.kind_of_gas.lower)
 
     def share(self, x: float, y: float, time: float) -> float:
-        """Share of the gas in the air, 0 to 1."""
+        """Return the share of the gas in the air, 0 to 1."""
         if time <= self._leak.start:
             return 0.0
         if not self._indoors:
@@ -225,7 +225,7 @@ class LeakField(SolvedField):
         return min(1.0, float(before[node]) * (1.0 - weight) + float(after[node]) * weight)
 
     def seen_from(self, x: float, y: float) -> Callable[[float], float]:
-        """The share of gas at a place [m] by the age of a leak that goes on [s].
+        """Return the share of gas at a place [m] by the age of a leak that goes on [s].
 
         In still air as much gas comes from one place to another as would come back from there:
         one solution, with the source at this place, serves leaks wherever they are. In a large
@@ -260,7 +260,7 @@ class LeakField(SolvedField):
         return alarm_in(detector, lambda age: self._air_with(share(age)))
 
     def _outdoors(self, x: float, y: float, time: float) -> float:
-        """In the plume: what is there was set free when the wind set out from the leak."""
+        """Return the plume: what is there was set free when the wind set out from the leak."""
         leak = self._leak
         if self._indoors or self.building.space_at(x, y) != NOWHERE:
             return 0.0

@@ -37,12 +37,12 @@ FITTED = 0.1  # from so far on [km]
 
 
 def sigma_y(stability: str, distance: float) -> float:
-    """Standard deviation across the wind [m] at a distance downwind [m]."""
+    """Return standard deviation across the wind [m] at a distance downwind [m]."""
     return float(CLASSES[stability].a * (distance / 1000.0) ** 0.894)
 
 
 def sigma_z(stability: str, distance: float) -> float:
-    """Standard deviation upwards [m] at a distance downwind [m]."""
+    """Return standard deviation upwards [m] at a distance downwind [m]."""
     spread = CLASSES[stability]
     x = max(FITTED, distance / 1000.0)
     c, d, f = spread.near if x <= 1.0 else spread.far
@@ -50,7 +50,7 @@ def sigma_z(stability: str, distance: float) -> float:
 
 
 def plume(rate: float, wind: float, stability: str, x: float, y: float, z: float) -> float:
-    """Share of gas in the air downwind of a steady source on the ground.
+    """Return the share of gas in the air downwind of a steady source on the ground.
 
     Args:
         rate: Gas set free [m^3/s].

@@ -102,15 +102,15 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
             raise TypeError(f"shows of {cls.__name__} should be some of {', '.join(QUANTITIES)}")
 
     def radius(self, time: float) -> float:
-        """Radius that can be seen at `time` [s], in [m]."""
+        """Return radius that can be seen at `time` [s], in [m]."""
         raise NotImplementedError
 
     def danger_radius(self, time: float) -> float:
-        """Radius within which people should not be at `time` [s], in [m]."""
+        """Return radius within which people should not be at `time` [s], in [m]."""
         raise NotImplementedError
 
     def severity(self, time: float) -> float:
-        """0 (nothing yet) to 1 at `time` [s]."""
+        """Return 0 (nothing yet) to 1 at `time` [s]."""
         raise NotImplementedError
 
     def field(self, site: Site) -> HazardField:
@@ -118,11 +118,11 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
         raise NotImplementedError
 
     def noticed_by(self) -> tuple[str, ...]:
-        """Kinds of detector that notice it with these settings."""
+        """Return kinds of detector that notice it with these settings."""
         return self.detectors
 
     def explodes_at(self) -> float:
-        """Share of its gas in the air that can explode; infinite if it has none."""
+        """Return the share of its gas in the air that can explode; infinite if it has none."""
         return math.inf
 
     def sprite(self, time: float, ceiling: float) -> Sprite | None:
@@ -154,7 +154,7 @@ class HazardField:
         raise NotImplementedError
 
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
-        """A raster of what it adds, such as `water`; None if it adds nothing of the kind.
+        """Return a raster of what it adds, such as `water`; None if it adds nothing of the kind.
 
         Args:
             what: One of `QUANTITIES`; or `layer`, smoke as it is where it is thickest between
@@ -172,7 +172,7 @@ class HazardField:
         return "smoke" in self.hazard.shows and time > self.hazard.start
 
     def haze(self, places: SitePoints, time: float) -> Floats:
-        """Extinction of light at places, at the height of a person's eyes [1/m]."""
+        """Return the extinction of light at places, at the height of a person's eyes [1/m]."""
         return self._part("extinction", places, time)
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
@@ -180,7 +180,7 @@ class HazardField:
         return alarm_in(detector, lambda age: self.at(x, y, age))
 
     def _part(self, part: str, places: SitePoints, time: float) -> Floats:
-        """One part of the conditions, point by point."""
+        """Return one part of the conditions, point by point."""
         points = places.points.reshape(-1, 2).tolist()
         values = [getattr(self.at(x, y, time), part) for x, y in points]
         return np.array(values, float).reshape(places.spaces.shape)
@@ -207,20 +207,20 @@ class March:
         self.hazy: dict[int, bool] = {}
 
     def around(self, age: float) -> tuple[Floats, Floats, float]:
-        """The states before and after an age [s], and the weight of the later one."""
+        """Return the states before and after an age [s], and the weight of the later one."""
         ages = self.ages
         after = self.after(age)
         weight = (age - ages[after - 1]) / (ages[after] - ages[after - 1])
         return self.states[after - 1], self.states[after], max(0.0, weight)
 
     def after(self, age: float) -> int:
-        """The first state that is later than an age [s], from 1 on."""
+        """Return the first state that is later than an age [s], from 1 on."""
         while self.ages[-1] <= age:
             self._advance()
         return bisect_right(self.ages, age, 1)
 
     def at(self, age: float) -> Floats:
-        """The state at an age [s], between two steps on the straight line."""
+        """Return the state at an age [s], between two steps on the straight line."""
         before, after, weight = self.around(age)
         between: Floats = before + weight * (after - before)
         return between
@@ -249,7 +249,7 @@ class SolvedField(HazardField):
         self._states: tuple[Floats, Floats, float]
 
     def solve(self) -> tuple[March, Step]:
-        """The states with the source, shared from age 0 on; and the step without it."""
+        """Return the states with the source, shared from age 0 on; and the step without it."""
         raise NotImplementedError
 
     @cached_property
@@ -270,7 +270,7 @@ class SolvedField(HazardField):
         return self._own[1], age - stopped
 
     def states(self, time: float) -> tuple[Floats, Floats, float]:
-        """The states before and after `time` [s], and the weight of the later one.
+        """Return the states before and after `time` [s], and the weight of the later one.
 
         Everybody asks at the same moments.
         """
@@ -281,7 +281,7 @@ class SolvedField(HazardField):
         return self._states
 
     def state(self, time: float) -> Floats:
-        """The state at `time` [s], between two steps on the straight line."""
+        """Return the state at `time` [s], between two steps on the straight line."""
         before, after, weight = self.states(time)
         between: Floats = before + weight * (after - before)
         return between
@@ -300,7 +300,7 @@ def first_detection(hazard: Hazard, site: Site) -> tuple[Detector | None, float]
 def _first(
     hazard: Hazard, detectors: Sequence[Detector], site: Site
 ) -> tuple[Detector | None, float]:
-    """All detectors are asked at growing ages until one sounds."""
+    """Return all detectors are asked at growing ages until one sounds."""
     best: tuple[Detector | None, float] = None, math.inf
     if not detectors:
         return best
@@ -318,7 +318,7 @@ def _first(
 
 
 def _ages() -> Iterator[tuple[float, float]]:
-    """Ages at which alarms are asked, and the time since the last one [s]: 2 % apart."""
+    """Yield ages at which alarms are asked, and the time since the last one [s]: 2 % apart."""
     age = 0.0
     while age < LATEST:
         dt = float(max(1, round(0.02 * age)))

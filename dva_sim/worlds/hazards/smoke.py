@@ -48,7 +48,7 @@ MASS, HEAT, SOOT, CO = range(4)  # columns of a state: [kg], [kJ] above ambient,
 
 
 def plume(convective: float, height: float) -> float:
-    """Air that a fire pumps up to a height [m] above its base, in [kg/s].
+    """Return air that a fire pumps up to a height [m] above its base, in [kg/s].
 
     Args:
         convective: Heat that rises [kW].
@@ -88,7 +88,7 @@ class SmokeLayers:
         return np.zeros((self._spaces.count + 1, 4))
 
     def step(self, state: Floats, age: float, dt: float) -> Floats:
-        """The state `dt` [s] later."""
+        """Return the state `dt` [s] later."""
         return self._move(state, self._heat(age + dt / 2), dt)
 
     def step_without_fire(self, state: Floats, age: float, dt: float) -> Floats:
@@ -145,7 +145,7 @@ class SmokeLayers:
     def _doorways(
         self, open_: NDArray[np.int64], bottom: Floats, kelvin: Floats
     ) -> tuple[Floats, Floats]:
-        """Smoke that leaves each side of each doorway [kg/s], and at which height [m].
+        """Return the smoke that leaves each side of each doorway [kg/s], and at which height [m].
 
         As much air flows in as smoke flows out (Rockett): the pressure at the floor differs
         by what makes it so.
@@ -194,12 +194,12 @@ class SmokeLayers:
 
 
 def volumes(state: Floats) -> Floats:
-    """Volume of each layer [m^3]: at one pressure, mass and heat add to it alike."""
+    """Return the volume of each layer [m^3]: at one pressure, mass and heat add to it alike."""
     return (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
 
 
 def _entrained(mass: Floats, heat: Floats, rise: Floats) -> Floats:
-    """Air that smoke draws in as it rises from a doorway [kg/s].
+    """Return air that smoke draws in as it rises from a doorway [kg/s].
 
     It goes on as the plume of a fire would that had drawn in so much already.
     """

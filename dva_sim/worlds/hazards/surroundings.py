@@ -61,7 +61,7 @@ class Surroundings:
         return any("water" in hazard.shows for hazard in self._hazards)
 
     def contain(self, number: int, time: float) -> None:
-        """Hazard `number`, from 0, is dealt with at `time` [s]: its source stops for good."""
+        """Deal with hazard `number`, from 0, at `time` [s]: its source stops for good."""
         field = self._fields[number]
         field.until = min(field.until, time)
 
@@ -94,7 +94,7 @@ class Surroundings:
         return total * length / count
 
     def raster(self, what: str, time: float, cell: float = 0.25) -> Raster:
-        """A field as a picture shows it.
+        """Return a field as a picture shows it.
 
         Args:
             what: `smoke` (extinction, mean from floor to ceiling), `layer` (extinction in the
@@ -114,7 +114,7 @@ class Surroundings:
         return Raster(values, extent, QUANTITIES["smoke" if what == "layer" else what].unit)
 
     def _places_of(self, cell: float) -> SitePoints:
-        """The points of a picture, worked out once."""
+        """Return the points of a picture, worked out once."""
         if cell not in self._places:
             west, south, east, north = self._site.extent
             x = west + cell * (np.arange(max(1, math.ceil((east - west) / cell - 1e-6))) + 0.5)

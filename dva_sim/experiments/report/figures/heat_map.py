@@ -101,7 +101,7 @@ class HeatMap(style.ReportFigure):
 
 
 def _fields(view: StudyView) -> list[EffectField]:
-    """One for each setting of the factors that are not shown, as many as there is room for."""
+    """Return one for each setting of the factors not shown, as far as there is room."""
     second = _second(view)
     if second is None or view.contrast is None:
         return []
