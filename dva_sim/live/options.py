@@ -74,6 +74,8 @@ def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
         raise ConfigError(f"--dva names {given} addresses, and the scenario has {has}")
     if scenario.dva.deaths:
         raise ConfigError("dva.deaths: only in virtual time; end the process of a DVA instead")
+    if scenario.dva.backbone is not None:
+        raise ConfigError("dva.backbone: only in virtual time; live, DVAs share the local network")
     if scenario.dva.regions and options.link:
         raise ConfigError("--link: not with dva.regions, whose DVAs would all be at one end")
     if options.only == "dva" and options.number > count:

@@ -69,6 +69,7 @@ def test_a_run_whose_dvas_have_all_been_killed_ends(programs, hall):
         ({"only": "dva", "number": 3}, "--number 3: the scenario has 2 DVAs"),
         ({"link": ("loss=0.1",)}, "--link: not with dva.regions"),
         ({"set": ("dva.deaths=[{region: east, at_s: 5}]",)}, "dva.deaths: only in virtual time"),
+        ({"set": ("dva.backbone.delay_s=0.1",)}, "dva.backbone: only in virtual time"),
     ],
 )
 def test_what_several_dvas_cannot_do_over_sockets_is_refused_in_a_line(hall, options, problem):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
 from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
@@ -178,6 +179,7 @@ class Run:
         self.links = {} if self.is_real else self._make_links()
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
+        self._backbone = {} if self.is_real else self._make_backbone()
         self._keeps_events = watched.keeps
         self._dead: list[DvaAgent] = []  # in whose place others were started
         self.dvas = {
@@ -211,8 +213,8 @@ class Run:
         Disturbance(self.stage, self._dva_of, self.field)
         for dva in self.dvas.values():
             dva.start()
-        for death in scenario.dva.deaths:
-            self._schedule_death(death)
+        for order, death in enumerate(scenario.dva.deaths, 1):
+            self._schedule_death(order, death)
         self.clock.every(WATCH_PERIOD, self._watch)
         if watched.keeps:
             self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
@@ -358,16 +360,19 @@ class Run:
         self.dva = add_dva(self.stage, None, memory, self._keeps_events)
         self.dva.start()
 
-    def _schedule_death(self, death: DvaDeath) -> None:
-        """End the own DVA of a region at its time, and start it again where that is wanted."""
-        number = 1 + list(self.scenario.dva.regions).index(death.region)
-        self.clock.call_at(death.at_s, self.end_dva, number)
+    def _schedule_death(self, order: int, death: DvaDeath) -> None:
+        """End a DVA at its time, and start it again where that is wanted."""
+        draws = self.stage.streams[f"death-{order}"]
+        at_s = float(draws.uniform(death.at_s, max(death.at_s, death.latest_s or 0.0)))
+        number = 1 + int(len(self.dvas) * draws.random())
+        if death.region is not None:
+            number = 1 + list(self.scenario.dva.regions).index(death.region)
+        self.clock.call_at(at_s, self.end_dva, number)
         if death.back_after_s is not None:
-            back_s = death.at_s + death.back_after_s
-            self.clock.call_at(back_s, self.start_region_again, number)
+            self.clock.call_at(at_s + death.back_after_s, self.start_region_again, number)
 
     def end_dva(self, number: int) -> None:
-        """End the DVA of a region without a word, as by kill -9."""
+        """End a DVA, by its number among those of the regions, without a word, as by kill -9."""
         dva = self.dvas[id_of("dva", number)]
         if not dva.is_gone and isinstance(self.network, VirtualNetwork):
             dva.device.tell("is killed", "link")
@@ -414,6 +419,19 @@ class Run:
         name = f"{stage.labels[robot]}/link"
         return make_link(self.scenario.link, direction, stage.streams, name, reception)
 
+    def _make_backbone(self) -> dict[tuple[str, str], tuple[Link, Link]]:
+        """Return the link from each DVA to each other and back; none where all are on the LAN."""
+        config = self.scenario.dva.backbone
+        links: dict[tuple[str, str], tuple[Link, Link]] = {}
+        if config is None:
+            return links
+        for one, other in combinations(dvas_of(self.scenario), 2):
+            name = f"{self.stage.labels[one]}/{self.stage.labels[other]}"
+            up = make_link(config, "up", self.stage.streams, name)
+            down = make_link(config, "down", self.stage.streams, name)
+            links |= {(one, other): (up, down), (other, one): (down, up)}
+        return links
+
     def _reception(self, robot: str) -> Reception | None:
         """The radio link's quality where a robot was at the last tick of the physics."""
         known = self.field.robots.get(robot)  # it talks before the next one has been placed
@@ -434,13 +452,13 @@ class Run:
         )
 
     def _unparted(self, source: str, destination: str) -> tuple[Link, Link]:
-        """A robot's link is the only one that matters; everybody else is on the LAN."""
+        """A robot's link or the backbone; everybody else is on the LAN."""
         if destination in self.links:
             return self.links[destination]
         if source in self.links:
             up, down = self.links[source]
             return down, up
-        return self._lan
+        return self._backbone.get((source, destination), self._lan)
 
     # --- observers: see `Observer` -----------------------------------------------------
 

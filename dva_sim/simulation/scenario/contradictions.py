@@ -65,7 +65,8 @@ def _of_modelled_link(scenario: Scenario) -> Iterator[str]:
 
 def _of_link(scenario: Scenario) -> Iterator[str]:
     """Time-outs and limits that the link's delay, or its rate, goes beyond."""
-    trip, needs, timeout = (of(scenario) for of in (round_trip_s, start_needs_s, request_timeout_s))
+    trip = round_trip_s(scenario.link)
+    needs, timeout = start_needs_s(scenario), request_timeout_s(scenario)
     why = f"with a round trip of {trip:g} s"
     if _moves_robots(scenario) and timeout < needs:
         yield (

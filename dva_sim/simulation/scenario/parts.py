@@ -26,6 +26,7 @@ from dva_sim.kernel.assumed import OmitsUnset
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.link import LinkConfig
 from dva_sim.protocol.messages import ReleasedBy
 from dva_sim.worlds.hazards import KINDS, make_hazard
 
@@ -493,14 +494,23 @@ class DvaDeath(Config):
     """The end of a DVA in a run, as by kill -9.
 
     Attributes:
-        region: Region whose own DVA ends.
+        region: Region whose own DVA ends; left out: the run's seed chooses one, or the only DVA
+            ends.
         at_s: Time of its end.
+        latest_s: Latest time of its end: if given, the seed draws it between `at_s` and this.
         back_after_s: Time until it is started again, with nothing kept; left out: never.
     """
 
-    region: str
+    region: str | None = None
     at_s: NonNegative
+    latest_s: NonNegative | None = None
     back_after_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> DvaDeath:
+        if self.latest_s is not None and self.latest_s < self.at_s:
+            raise ValueError(f"latest_s {self.latest_s:g} is before at_s {self.at_s:g}")
+        return self
 
 
 class DvaConfig(Config):
@@ -517,7 +527,9 @@ class DvaConfig(Config):
             and detectors and callers report again as it grows. Left out: `followed` at a console,
             else `reported`.
         regions: Regions of the site by name, each with a DVA of its own; left out: one DVA.
-        deaths: DVAs of regions that end during a run in virtual time.
+        deaths: DVAs that end during a run in virtual time.
+        backbone: Link between each two DVAs of regions, in virtual time; `up` is from the earlier
+            to the later region. Left out: they share the local network. One DVA has none.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
@@ -531,6 +543,16 @@ class DvaConfig(Config):
         dict[Annotated[str, Field(pattern=REGION)], RegionConfig], Field(max_length=16)
     ] = Field(default_factory=dict)
     deaths: tuple[DvaDeath, ...] = ()
+    backbone: Annotated[
+        LinkConfig | None,
+        Key(
+            "link between DVAs",
+            inner={
+                "delay_s": Key("one-way delay between DVAs"),
+                "loss": Key("packet loss between DVAs"),
+            },
+        ),
+    ] = None
 
     @model_validator(mode="after")
     def _regions_are_a_division(self) -> DvaConfig:
@@ -547,8 +569,10 @@ class DvaConfig(Config):
                     f"regions.{name}.deputy: {unknown('region', each.deputy, regions)}"
                 )
         for death in self.deaths:
-            if death.region not in regions:
+            if death.region is not None and death.region not in regions:
                 raise ValueError(f"deaths: {unknown('region', death.region, regions)}")
+        if self.backbone is not None and self.backbone.partitions:
+            raise ValueError("backbone.partitions: link.partitions part DVAs, too; use those")
         return self
 
 

@@ -50,7 +50,7 @@ NEWER = (
     ("operator", "kind"),
     ("disturbance",),
     ("dva",),
-    ("dva", "control_rooms", "severity", "regions", "deaths"),
+    ("dva", "control_rooms", "severity", "regions", "deaths", "backbone"),
     ("emergency",),
     ("instructions",),
 )

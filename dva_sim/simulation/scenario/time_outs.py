@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
     robot_profiles,
@@ -24,9 +25,13 @@ def time_out_s(needed_s: float) -> float:
 
 
 def request_timeout_s(scenario: Scenario) -> float:
-    """Time-out of a request: as given, else as the link needs it [s]."""
+    """Time-out of a request: as given, else as the link and the backbone need it [s]."""
     given = scenario.request.timeout_s
-    return time_out_s(start_needs_s(scenario)) if given is None else given
+    backbone = scenario.dva.backbone
+    needed_s = start_needs_s(scenario)
+    if backbone is not None:
+        needed_s = max(needed_s, TRIPS_OF_A_START * round_trip_s(backbone))
+    return time_out_s(needed_s) if given is None else given
 
 
 def command_timeout_s(scenario: Scenario) -> float:
@@ -37,17 +42,17 @@ def command_timeout_s(scenario: Scenario) -> float:
 
 def start_needs_s(scenario: Scenario) -> float:
     """Return how long the first answer over a new connection to a robot takes [s]."""
-    return TRIPS_OF_A_START * round_trip_s(scenario) + mean_processing_s(scenario)
+    return TRIPS_OF_A_START * round_trip_s(scenario.link) + mean_processing_s(scenario)
 
 
 def command_needs_s(scenario: Scenario) -> float:
     """Return how long the reply to a command takes, over an open connection [s]."""
-    return round_trip_s(scenario) + mean_processing_s(scenario)
+    return round_trip_s(scenario.link) + mean_processing_s(scenario)
 
 
-def round_trip_s(scenario: Scenario) -> float:
-    """Mean delay there and back, without queues and losses [s]."""
-    return sum(scenario.link.toward(way).delay_s for way in ("up", "down"))
+def round_trip_s(link: LinkConfig) -> float:
+    """Mean delay of a link there and back, without queues and losses [s]."""
+    return sum(link.toward(way).delay_s for way in ("up", "down"))
 
 
 def mean_processing_s(scenario: Scenario) -> float:

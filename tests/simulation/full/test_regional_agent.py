@@ -191,3 +191,70 @@ def test_a_device_takes_a_hand_over_only_from_its_dva_and_to_one_that_it_knows(s
 def test_the_same_seed_gives_the_same_run_of_several_dvas():
     one, other = (hall(dva__deaths=DEATH).run() for _ in range(2))
     assert one.recorder.timeline == other.recorder.timeline
+
+
+# --- the backbone ----------------------------------------------------------------------------
+
+
+def reported(**changes):
+    """The answer to a report of the west, and the time that it took [s]."""
+    run = hall(**changes)
+    device, answers = caller(run, 10, 5, WEST), []
+    run.clock.run(4.0)
+    report(run, device, 10, 5, answers)
+    while not answers:
+        run.clock.run(run.clock.now + 0.01)
+    return answers[0].text, run.clock.now - 4.0
+
+
+def test_a_report_waits_for_its_copy_to_cross_the_backbone_and_back():
+    text, took = reported(dva__backbone={"delay_s": 0.1})
+    assert text == ""
+    assert 0.2 <= took < 0.25
+    assert reported()[1] < 0.05
+
+
+def test_over_a_backbone_of_300_ms_a_report_is_answered_before_its_copy():
+    text, took = reported(dva__backbone={"delay_s": 0.3})
+    assert text == "unreplicated"
+    assert took == pytest.approx(0.3, abs=0.05)
+
+
+def test_an_outage_of_the_backbone_parts_dvas_and_nobody_else():
+    run = hall(dva__backbone={"outages": [{"from_s": 10, "for_s": 60}]})
+    run.clock.run(40.0)
+    assert run.dvas[WEST].core.registry.entries[EAST].silent
+    assert not run.dvas[EAST].core.registry.entries[id_of("guard", 1)].silent
+    assert run.dvas[WEST].core.division.claims["east"] == (1, EAST)
+    run.clock.run(90.0)
+    assert not run.dvas[WEST].core.registry.entries[EAST].silent
+    assert not run.recorder.broken
+
+
+def test_the_same_seed_gives_the_same_run_over_a_backbone_with_losses():
+    lossy = {"delay_s": 0.05, "jitter_s": 0.02, "loss": 0.2}
+    one, other = (hall(dva__backbone=lossy).run() for _ in range(2))
+    assert one.recorder.timeline == other.recorder.timeline
+    assert not one.recorder.broken
+
+
+# --- deaths ----------------------------------------------------------------------------------
+
+
+def test_a_death_without_a_region_strikes_a_dva_and_a_moment_of_the_seed():
+    found = set()
+    for seed in range(1, 9):
+        run = Run(scenarios.build(HALL, {"dva.deaths": [{"at_s": 5, "latest_s": 15}]}), seed)
+        run.clock.run(5.0)
+        assert not any(dva.is_gone for dva in run.dvas.values())
+        run.clock.run(15.0)
+        found |= {dva.device.id_tag for dva in run.dvas.values() if dva.is_gone}
+    assert found == {WEST, EAST}
+
+
+def test_after_the_death_of_the_only_dva_nobody_is_sent():
+    one = {key: value for key, value in HALL.items() if key != "dva"}
+    run = Run(scenarios.build(one, {"dva.deaths": [{"at_s": 2}], "horizon_s": 60}), 1)
+    recording = run.run()
+    assert recording.events == []
+    assert recording.duration == 60.0

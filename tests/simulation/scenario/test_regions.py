@@ -71,7 +71,25 @@ def test_a_death_of_an_unknown_region_is_refused():
         scenarios.build(HALL | {"dva": {"regions": {"west": WEST, "east": EAST}, "deaths": deaths}})
 
 
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"deaths": [{"at_s": 9, "latest_s": 5}]}, "latest_s 5 is before at_s 9"),
+        ({"backbone": {"partitions": [{"from_s": 1, "for_s": 2}]}}, "link.partitions part DVAs"),
+        ({"backbone": {"jitter_s": 0.2, "delay_s": 0.1}}, "jitter_s 0.2 is above delay_s 0.1"),
+    ],
+)
+def test_what_no_backbone_and_no_death_can_be_is_refused(changes, problem):
+    with pytest.raises(ConfigError) as refused:
+        scenarios.build(HALL | {"dva": {"regions": {"west": WEST, "east": EAST}, **changes}})
+    assert problem in str(refused.value)
+
+
+def test_a_request_waits_for_the_slower_of_link_and_backbone():
+    far = scenarios.build(HALL | {"dva": {"backbone": {"delay_s": 2}}, "link": {"delay_s": 1}})
+    assert scenarios.request_timeout_s(far) == pytest.approx(1.25 * 16.0)
+
+
 def test_a_scenario_of_one_dva_is_written_as_before():
     written = scenarios.build(HALL | {"dva": {"sensors": ["smoke"]}}).model_dump()["dva"]
-    assert "regions" not in written
-    assert "deaths" not in written
+    assert not {"regions", "deaths", "backbone"} & written.keys()
