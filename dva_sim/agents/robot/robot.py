@@ -294,9 +294,13 @@ class RobotAgent:
         self._confirmations.ask()
 
     def _obeys(self, dva: str) -> None:
-        """Believe another DVA from now on; who drives the robot goes on."""
+        """Believe another DVA from now on, and tell it who drives the robot, who goes on."""
         self.controller.dva = dva
         self.device.connect(dva)
+        grant = self.controller.grant
+        if grant is not None:
+            brought = m.GetGrant(grant.holder, grant.level)
+            self.device.ask(dva, brought, session=grant.session)
 
     def withdraw(self, why: str) -> None:
         """Stand idle, and take no order until `return_to_service`: nobody can drive it safely.

@@ -12,13 +12,14 @@ from dva_sim.core.events import Event, State, apart
 from dva_sim.core.regions.borders import Borders
 from dva_sim.core.regions.division import Claim, Division
 from dva_sim.core.regions.help import MutualHelp
+from dva_sim.core.regions.leases import Leases
 from dva_sim.core.regions.strays import Strays
 from dva_sim.core.regions.takeover import Deputy
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.reports import NO_NEWS
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import PEER
+from dva_sim.protocol.devices import PEER, ROBOT
 
 FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
 NUMBERS = 1_000_000  # of events that one DVA gives: no two give the same
@@ -38,6 +39,7 @@ class RegionalDva(Dva):
         borders: Devices that cross a border.
         deputy: Copies of the events of others.
         strays: Events that belong to others.
+        leases: Permissions that robots bring from a DVA that has died.
         peers: Latest status of the other DVAs, by id.
     """
 
@@ -50,6 +52,7 @@ class RegionalDva(Dva):
         self.borders = Borders(division, self.orders, self.help)
         self.deputy = Deputy(division, self.orders, self.help)
         self.strays = Strays(division, self.orders, self.help)
+        self.leases = Leases(self.registry, self.sessions)
         self.peers: dict[str, m.PeerStatus] = {}
         self.orders.unwatched |= set(division.peers)
         self._strangers: set[str] = set()
@@ -122,6 +125,7 @@ class RegionalDva(Dva):
         self.deputy.take_over(now)
         self.deputy.resume(now)
         self._copy_to_new_deputies()
+        self.leases.lapse(now)
         sends = super().tick(now)
         sends += self.borders.cross(now)
         sends += self.help.ask(now)
@@ -147,6 +151,8 @@ class RegionalDva(Dva):
             return answer
         if isinstance(body, m.EventReport) and body.event_id is None:
             self.deputy.reported(message.source, self.division.region_at(body.position))
+        if isinstance(body, m.GetGrant) and entry is not None and entry.kind == ROBOT:
+            self.leases.bring(message.source, body, message.session or 0, now)
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):
             return DvaAnswer(m.BUSY, "it is driven under a session of another DVA")
         if entry is None or entry.kind != PEER:

@@ -1,7 +1,15 @@
 """Deputies: what they keep, when they take over, and what becomes of the events."""
 
 import pytest
-from helpers.dva.dispatch_office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, east
+from helpers.dva.dispatch_office import (
+    DETECTOR,
+    GUARD,
+    OPERATOR,
+    OTHER_GUARD,
+    OTHER_OPERATOR,
+    ROBOT,
+    east,
+)
 from helpers.dva.two_offices import EAST, WEST, Street
 
 from dva_sim.core.events import State
@@ -183,3 +191,74 @@ def test_a_region_whose_deputy_has_taken_over_and_forgotten_it_is_served_again()
     street.tick(3)
     assert street.cores[WEST].division.claims["west"] == Claim(3, WEST)
     assert street.cores[EAST].division.claims["west"] == Claim(3, WEST)
+
+
+# --- permissions of the dead -----------------------------------------------------------------
+
+SESSION = 1001 << 32
+
+
+def brought(street, holder=OPERATOR, level="teleoperation", session=SESSION):
+    """The reply to a robot that has come to the east, and says who holds it."""
+    street.register(EAST, ROBOT, "Robot")
+    return street.say(EAST, ROBOT, m.GetGrant(holder, level), session)
+
+
+def test_a_permission_of_the_dead_holds_at_the_dva_that_the_robot_comes_to():
+    street = dead_west()
+    for operator in (OPERATOR, OTHER_OPERATOR):
+        street.register(EAST, operator, "TeleOp")
+    reply = brought(street)
+    assert reply.content == m.Permission(OPERATOR, "teleoperation", SESSION)
+    street.tick(20, ROBOT, OPERATOR, OTHER_OPERATOR)
+    wish = m.PermissionRequest(ROBOT, "teleoperation")
+    assert street.say(EAST, OTHER_OPERATOR, wish).text.startswith(f"held by {OPERATOR}")
+    over = m.PermissionRevocation(ROBOT, OPERATOR, SESSION)
+    assert street.say(EAST, OPERATOR, over).code == m.OK
+    granted = street.say(EAST, OTHER_OPERATOR, wish)
+    assert granted.code == m.OK
+    assert granted.content.session > SESSION
+
+
+def test_a_permission_of_the_dead_ends_ten_seconds_later_if_its_holder_does_not_come():
+    street = dead_west()
+    brought(street)
+    street.tick(10, ROBOT)
+    assert street.told(ROBOT, m.PermissionRevocation) == []
+    street.tick(1, ROBOT)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, SESSION)
+    assert street.told(ROBOT, m.PermissionRevocation) == [over]
+
+
+def test_a_permission_of_the_dead_ends_with_a_silence_of_its_holder():
+    street = dead_west()
+    street.register(EAST, OPERATOR, "TeleOp")
+    brought(street)
+    street.tick(5, ROBOT, OPERATOR)
+    street.tick(11, ROBOT)
+    assert street.told(ROBOT, m.PermissionRevocation)
+
+
+@pytest.mark.parametrize(
+    "claim",
+    [
+        {"session": 0},
+        {"session": 2**63},
+        {"level": "sensors"},
+        {"holder": None, "level": None},
+    ],
+)
+def test_what_is_no_permission_to_drive_is_not_taken_over(claim):
+    street = dead_west()
+    assert brought(street, **claim).code == m.NOT_PERMITTED
+    assert not street.cores[EAST].sessions.permissions.all()
+
+
+def test_a_robot_brings_nothing_where_somebody_has_it_already():
+    street = dead_west()
+    for operator in (OPERATOR, OTHER_OPERATOR):
+        street.register(EAST, operator, "TeleOp")
+    street.register(EAST, ROBOT, "Robot")
+    wish = m.PermissionRequest(ROBOT, "teleoperation")
+    assert street.say(EAST, OTHER_OPERATOR, wish).code == m.OK
+    assert brought(street).code == m.NOT_PERMITTED

@@ -59,9 +59,9 @@ class Street:
             MinEta(), crow, self._rules, rng=rng, sessions=sessions, division=division
         )
 
-    def say(self, to: str, source: str, body: m.Body) -> m.Reply:
+    def say(self, to: str, source: str, body: m.Body, session: int = 0) -> m.Reply:
         self.number += 1
-        message = m.Message(to, self.number, source, "12:00:00", 0, body)
+        message = m.Message(to, self.number, source, "12:00:00", session, body)
         reply, sends = self.cores[to].handle(message, self.now)
         self.deliver(to, sends)
         return reply

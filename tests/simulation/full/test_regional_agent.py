@@ -3,6 +3,7 @@
 import pytest
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.core.regions.leases import Leases
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.regional_agent import NOT_COPIED
@@ -258,3 +259,36 @@ def test_after_the_death_of_the_only_dva_nobody_is_sent():
     recording = run.run()
     assert recording.events == []
     assert recording.duration == 60.0
+
+
+def driven_while_its_dva_dies():
+    """A run in which the western robot is driven to a fire when its DVA dies, 25 s later."""
+    run = hall(
+        control="direct",
+        guard__count=0,
+        events__0__position=[25, 35],
+        dva__deaths=[{"region": "west", "at_s": 12.0}],
+    )
+    run.clock.run(11.0)
+    robot = next(iter(run.field.robots.values()))
+    session = robot.controller.grant.session
+    assert run.dvas[WEST].core.sessions.permissions.grants[id_of("robot", 1)].session == session
+    run.clock.run(37.0)
+    assert robot.device.dva == EAST
+    return run, session
+
+
+def test_a_permission_holds_at_the_deputy_while_its_drive_goes_on():
+    run, session = driven_while_its_dva_dies()
+    grant = run.dvas[EAST].core.sessions.permissions.grants[id_of("robot", 1)]
+    assert (grant.holder, grant.session) == (id_of("operator", 1), session)
+    run.clock.run(200.0)
+    assert [drive.outcome for drive in run.recorder.drives] == ["confirmed"]
+    assert not run.dvas[EAST].core.sessions.permissions.grants
+    assert not run.recorder.broken
+
+
+def test_a_deputy_that_believes_no_robot_knows_no_holder(monkeypatch):
+    monkeypatch.setattr(Leases, "bring", lambda *_: None)
+    run, _ = driven_while_its_dva_dies()
+    assert not run.dvas[EAST].core.sessions.permissions.grants

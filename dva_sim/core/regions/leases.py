@@ -1,0 +1,50 @@
+"""Leases: permissions of a DVA that has died, which hold on at the one that its robots come to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dva_sim.core.registry import Registry
+from dva_sim.core.sessions import Grant, Sessions
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS, is_absurd
+
+
+@dataclass
+class Leases:
+    """Keeps the permissions that robots bring with them, as long as their holders come, too.
+
+    A robot speaks for itself alone: what it brings takes nothing from anybody.
+
+    Attributes:
+        registry: Devices that are registered here.
+        sessions: Permissions of devices.
+    """
+
+    registry: Registry
+    sessions: Sessions
+    _brought: dict[int, float] = field(default_factory=dict)  # when, by session [s]
+
+    def bring(self, robot: str, body: m.GetGrant, session: int, now: float) -> None:
+        """Let a permission hold that another DVA has given; later sessions are above it."""
+        known = self.sessions.permissions
+        if body.holder is None or body.level in (None, "sensors") or robot in known.grants:
+            return
+        is_over = self.sessions.has_unacknowledged(robot)
+        if is_over or not session or is_absurd(session, known.count << LOW_BITS):
+            return
+        known.count = max(known.count, session >> LOW_BITS)
+        known.restore(Grant(robot, body.holder, body.level, session))
+        self._brought[session] = now
+
+    def lapse(self, now: float) -> None:
+        """End the permissions whose holders have not come within the time of a silence."""
+        held = {grant.session: grant for grant in self.sessions.permissions.grants.values()}
+        for session, since in list(self._brought.items()):
+            grant = held.get(session)
+            holder = None if grant is None else self.registry.entries.get(grant.holder)
+            if grant is None or (holder is not None and not holder.silent):
+                del self._brought[session]
+            elif now - since > self.registry.silent_after:
+                del self._brought[session]
+                self.sessions.revoke(grant)
