@@ -24,10 +24,11 @@ from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, nan_m
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
-from dva_sim.simulation.labels import measure_called
+from dva_sim.simulation.labels import factor_name, measure_called
 from dva_sim.statistics import band
 
 BESIDE = ("contacts", "stop_share")
+_OF_PERSONS = "operator.", "phone.", "guard.", "bystander."
 _WAITS = "move_and_wait_share"
 _LEAST = 0.05  # regret that is not printed as 0.0
 
@@ -41,7 +42,8 @@ class ChoiceMap:
             better.
         choice: Factor of the choices, `c` levels.
         given: Factor of the situations, `g` levels.
-        models: Factor of the models of persons, `m` levels.
+        models: Factor of the models of persons, or of other circumstances, `m` levels.
+        over: Words for its levels.
         mean: Mean of the measure, `(g, c, m)`.
         regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
         is_clear: True where the 95 % band of the regret lies above 0 and the regret above
@@ -64,6 +66,7 @@ class ChoiceMap:
     choice: Factor
     given: Factor
     models: Factor
+    over: str
     mean: Floats
     regret: Floats
     is_clear: NDArray[np.bool_]
@@ -179,6 +182,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         choice=view.line,
         given=view.over,
         models=models,
+        over=_words_for(models, study),
         mean=loss if is_loss else -loss,
         regret=loss - loss.min(axis=1, keepdims=True),
         is_clear=is_clear,
@@ -197,6 +201,14 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         waiting=_waiting(view, axes, declared.get("choosing")),
         notes=dict(declared.get("notes") or {}),
     )
+
+
+def _words_for(models: Factor, study: Mapping[str, Any]) -> str:
+    """Return words for the levels of a factor: models of the persons, if it changes those alone."""
+    levels = (study.get("treatments") or {}).get(models.name, {}).values()
+    keys = {key for changes in levels for key in changes} or {models.name}
+    is_of_persons = all(key.startswith(_OF_PERSONS) for key in keys)
+    return "models of the persons" if is_of_persons else f"levels of {factor_name(models.name)}"
 
 
 def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArray[Any]:

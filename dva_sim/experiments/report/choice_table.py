@@ -104,6 +104,7 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
     return {
         "unit": found.unit or "no unit",
         "models": len(found.models.levels),
+        "levels": found.over,
         "is_beyond": found.is_beyond,
         "is_marked": bool(found.outside.any()) and not found.is_beyond,
         "line": "column" if found.is_tall else "row",
@@ -161,6 +162,7 @@ def lead_of(found: ChoiceMap) -> str:
         choice=factor_name(found.choice.name),
         given=factor_name(found.given.name),
         models=len(found.models.levels),
+        levels=found.over,
         beyond=f", extrapolated{where}" if outside else "",
         best=[name for name, good in zip(names, settled, strict=True) if good.all()],
         count=len(names),

@@ -33,6 +33,12 @@ LOSSES = {  # mean over persons, by situation and choice: under `steer`, and und
 }
 STUDY = {
     "factors": {"link": list(LINKS), "messaging": list(CHOICES), "steering": list(MODELS)},
+    "treatments": {
+        "steering": {
+            "steer": {"operator.strategy": "pursuit"},
+            "wait": {"operator.strategy": "move_and_wait"},
+        }
+    },
     "parts": {"drive": {"scenario": "drive-to-event"}},
     "answer": {
         "part": "drive",
@@ -265,3 +271,12 @@ def test_what_too_few_persons_leave_open_is_neither_equal_nor_free():
     assert far[table.heads.index("ask")].endswith(" ?")
     assert far[1] == "nothing is shown to differ"
     assert wide.overall.max() > 500.0
+
+
+def test_levels_that_change_more_than_persons_are_not_called_models_of_them():
+    weather = {"steer": {"link.loss": 0.0}, "wait": {"operator.strategy": "move_and_wait"}}
+    found = read(STUDY | {"treatments": {"steering": weather}})
+    assert read().over == "models of the persons"
+    assert "over 2 levels of steering" in lead_of(found)
+    words = caption("map", **facts_of(found))
+    assert "least to the greatest over 2 levels of steering" in words
