@@ -49,7 +49,14 @@ from dva_sim.protocol.missions import (
     Patrol,
     ReturnToBase,
 )
-from dva_sim.protocol.peers import HandOver, PeerBody, PeerStatus, Replicate, ServedRegion
+from dva_sim.protocol.peers import (
+    GiveBack,
+    HandOver,
+    PeerBody,
+    PeerStatus,
+    Replicate,
+    ServedRegion,
+)
 from dva_sim.protocol.places import Position
 from dva_sim.protocol.reply_codes import (
     BAD_MESSAGE,

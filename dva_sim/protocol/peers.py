@@ -74,4 +74,18 @@ class Replicate:
     event: EventStatus
 
 
-PeerBody = PeerStatus | HandOver | Replicate
+@dataclass(frozen=True, slots=True)
+class GiveBack:
+    """A region goes back to its own DVA, from the one that has taken it over.
+
+    Attributes:
+        region: Name of the region.
+        epoch: Epoch in which the receiver, the region's own DVA, serves it; None: a supervisor asks
+            the DVA that serves it.
+    """
+
+    region: str
+    epoch: int | None = None
+
+
+PeerBody = PeerStatus | HandOver | Replicate | GiveBack

@@ -45,6 +45,7 @@ NEW = {
     "1.9": {
         *("event-report-passed-on", "hand-over", "hand-over-to-a-known-address"),
         *("peer-status", "peer-status-of-no-region", "replicate"),
+        *("give-back", "give-back-between-dvas"),
     },
 }
 OLD = {

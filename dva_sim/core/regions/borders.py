@@ -31,11 +31,13 @@ class Borders:
         division: Division of the site, with the service of each region.
         orders: Current orders.
         help: Tells who was lent: such a device comes back.
+        returning: Devices that go to the DVA of a region that was given back, by that region.
     """
 
     division: Division
     orders: Orders
     help: MutualHelp
+    returning: dict[str, str] = field(default_factory=dict)
     _since: dict[str, float] = field(default_factory=dict)
     _homes: dict[str, m.Position] = field(default_factory=dict)
     _asked: dict[str, float] = field(default_factory=dict)
@@ -57,11 +59,15 @@ class Borders:
                 sends += self._hand_over(entry, now) if now - since >= FOR else []
         if not any(self.division.served()):
             sends += self._all_others(now)
+        for device, region in self.returning.items():
+            guest = self.orders.registry.entries.get(device)
+            dva = self.division.claims[region].dva
+            sends += self._send(guest, dva, now) if guest and self._is_free(guest) else []
         return sends
 
     def forget(self, device: str) -> None:
         """A device is not registered here any longer."""
-        for kept in (self._since, self._homes, self._asked):
+        for kept in (self._since, self._homes, self._asked, self.returning):
             kept.pop(device, None)
         self.help.lent.discard(device)
 

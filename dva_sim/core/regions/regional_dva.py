@@ -13,13 +13,14 @@ from dva_sim.core.regions.borders import Borders
 from dva_sim.core.regions.division import Claim, Division
 from dva_sim.core.regions.help import MutualHelp
 from dva_sim.core.regions.leases import Leases
+from dva_sim.core.regions.returns import Returns
 from dva_sim.core.regions.strays import Strays
 from dva_sim.core.regions.takeover import Deputy
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.reports import NO_NEWS
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import PEER, ROBOT
+from dva_sim.protocol.devices import PEER, ROBOT, ControlRoomRole
 
 FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
 NUMBERS = 1_000_000  # of events that one DVA gives: no two give the same
@@ -39,6 +40,7 @@ class RegionalDva(Dva):
         borders: Devices that cross a border.
         deputy: Copies of the events of others.
         strays: Events that belong to others.
+        returns: Regions that are given back.
         leases: Permissions that robots bring from a DVA that has died.
         peers: Latest status of the other DVAs, by id.
     """
@@ -52,6 +54,7 @@ class RegionalDva(Dva):
         self.borders = Borders(division, self.orders, self.help)
         self.deputy = Deputy(division, self.orders, self.help)
         self.strays = Strays(division, self.orders, self.help)
+        self.returns = Returns(division, self.orders, self.borders, self.deputy)
         self.leases = Leases(self.registry, self.sessions)
         self.peers: dict[str, m.PeerStatus] = {}
         self.orders.unwatched |= set(division.peers)
@@ -104,6 +107,10 @@ class RegionalDva(Dva):
         if isinstance(send.body, m.HandOver):
             self.orders.counters["handed over"] += 1
             return self.dismiss(send.to, now)
+        if isinstance(send.body, m.GiveBack):
+            claim = Claim(send.body.epoch or 0, send.to)
+            is_news = self.division.learn(send.body.region, claim)
+            return self._with_revocations(self._yields([send.body.region], now) if is_news else [])
         if isinstance(send.body, m.EventReport) and send.body.event_id is None:
             return self._with_revocations(self.strays.taken(send, now))
         return super().delivered(send, now, content)
@@ -155,6 +162,8 @@ class RegionalDva(Dva):
             self.leases.bring(message.source, body, message.session or 0, now)
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):
             return DvaAnswer(m.BUSY, "it is driven under a session of another DVA")
+        if isinstance(body, m.GiveBack) and entry is not None and entry.kind != PEER:
+            return self._gives_back(entry, body)
         if entry is None or entry.kind != PEER:
             return super()._answer(message, now)
         self.registry.heard(message.source, now)
@@ -184,6 +193,8 @@ class RegionalDva(Dva):
                     self.registry.locate(entry, event.position)
             case m.Replicate() as copied:
                 return self.deputy.keep(source, copied, now)
+            case m.GiveBack() as returned:
+                return self.returns.take(source, returned)
         return super()._answer(message, now)
 
     def _copy_to_new_deputies(self) -> None:
@@ -214,11 +225,24 @@ class RegionalDva(Dva):
         before = dict(self.division.served())
         claims = [(each.region, Claim(each.epoch, peer)) for each in status.regions]
         learned = [self.division.learn(*claim) for claim in claims]
-        lost = before.keys() - dict(self.division.served()).keys()
-        self.orders.counters["region yielded"] += len(lost)
+        lost = sorted(before.keys() - dict(self.division.served()).keys())
         sends = self.help.unheard.pop(peer, [])
         sends += self.deputy.return_copies(peer, now) if any(learned) else []
-        return sends + (self.strays.pass_on(now) if lost else [])
+        return sends + (self._yields(lost, now) if lost else [])
+
+    def _yields(self, regions: list[str], now: float) -> list[Send]:
+        """Serve regions no longer; their events are passed on."""
+        self.orders.counters["region yielded"] += len(regions)
+        self.returns.yielded(regions)
+        return self.strays.pass_on(now)
+
+    def _gives_back(self, entry: DeviceEntry, body: m.GiveBack) -> DvaAnswer:
+        """Answer a supervisor who wants a region to be its own DVA's again."""
+        device = entry.device
+        refusal = self.control_rooms.may(device, ControlRoomRole.SUPERVISE, "give a region back")
+        if refusal is not None and device.id_tag not in self.handovers.supervisors:
+            return DvaAnswer(m.NOT_PERMITTED, refusal)
+        return self.returns.ask(body.region)
 
     # --- robots under sessions of others ---------------------------------------------------
 

@@ -12,11 +12,12 @@ from dva_sim.core.regions.division import Claim, Division
 from dva_sim.core.regions.help import MutualHelp
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import DETECTOR, PEER
+from dva_sim.protocol.devices import DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.wire_size import sent_time
 
 COME_WITHIN: Final = 4.0  # design: a responder that has not come by then is given up [s]
 MOST_COPIES: Final = 10_000  # of the events of one region
+_OF_A_PLACE: Final = PEER, DETECTOR, ROBOT, GUARD
 
 
 class Copy(NamedTuple):
@@ -44,6 +45,7 @@ class Deputy:
     copies: dict[str, dict[int, Copy]] = field(default_factory=dict)
     taken_over: dict[str, float] = field(default_factory=dict)
     _silent_since: dict[str, float] = field(default_factory=dict)
+    _died: dict[str, float] = field(default_factory=dict)  # by region taken over [s]
     _came: dict[str, float] = field(default_factory=dict)
     _reported: dict[str, float] = field(default_factory=dict)  # when such a one came [s]
 
@@ -89,6 +91,18 @@ class Deputy:
                 self.taken_over[region] = now
                 self.orders.counters["region taken over"] += 1
 
+    def yielded(self, region: str) -> list[str]:
+        """Go on with no copies of a region that is another's again, as that one does.
+
+        Returns:
+            Devices without a place that have come since the DVA of the region died.
+        """
+        self.taken_over.pop(region, None)
+        since = self._died.pop(region, math.inf)
+        entries = self.orders.registry.entries
+        came = (device for device, at in self._came.items() if at >= since and device in entries)
+        return [device for device in came if entries[device].kind not in _OF_A_PLACE]
+
     def came(self, device: str, now: float) -> None:
         """Note a device that was not registered here before."""
         self._came[device] = now
@@ -124,7 +138,7 @@ class Deputy:
             if not self._has_come(region, since):
                 continue
             self.division.learn(region, Claim(claim.epoch + 1, self.division.own))
-            self._silent_since.pop(region)
+            self._died[region] = self._silent_since.pop(region)
             self.taken_over[region] = now
             self.orders.counters["region taken over"] += 1
             taken.append(region)
