@@ -16,6 +16,7 @@ from typing import Any, Final
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.full.observations import page_of
 from dva_sim.simulation.full.run import Run, Watched
@@ -29,9 +30,12 @@ CALM: Final = 240.0  # faults have ended [s]
 LASTS: Final = 120.0  # from then to the end [s]
 FIRST: Final = 10.0  # faults begin [s]
 KILLED: Final = "region-killed"
+ASKS_AFTER: Final = 3.0  # from the registration of the supervisor [s]
 ALONE: Final = "region-alone"  # a DVA reaches detectors and nobody else
+RETURNED: Final = "region-given-back"  # a supervisor says so
 KINDS: Final = (KILLED, ALONE, "partition", "messages-lost", "messages-late", "messages-doubled")
 _WEIGHTS: Final = (3.0, 2.0, 2.0, 1.0, 1.5, 1.0)
+_BACKBONES: Final = (None, {"delay_s": 0.05}, {"delay_s": 0.3, "jitter_s": 0.1, "loss": 0.05})
 _HALL: Final = (60.0, 40.0)  # extent of the site [m]
 
 
@@ -54,12 +58,17 @@ def draw_regions(seed: int) -> StormPlan:
         "operator": {"count": min(robots, chance.choice((1, 2, 3)))},
         "control": chance.choice(("direct", "supervisory")),
         "link": {"delay_s": chance.choice((0.005, 0.05, 0.2))},
-        "dva": {"regions": regions},
+        "dva": {
+            "regions": regions,
+            "backbone": chance.choice(_BACKBONES),
+            "control_rooms": {"control-room-1": "supervise"},
+        },
         "events": [_event(chance) for _ in range(chance.randint(2, 8))],
     }
     labels = [f"dva-{name}" for name in regions]
     devices = ["guard-1", "guard-2", *(f"robot-{n + 1}" for n in range(robots))]
-    faults = (_fault(chance, labels, devices) for _ in range(chance.randint(1, 8)))
+    faults = [_fault(chance, labels, devices) for _ in range(chance.randint(1, 8))]
+    faults += [_return(chance, fault) for fault in faults if fault.kind == KILLED]
     return StormPlan(seed, scenario, tuple(sorted(faults, key=lambda f: f.at_s)), CALM)
 
 
@@ -73,6 +82,12 @@ def _event(chance: random.Random) -> dict[str, Any]:
         "reported": True,
         "false_alarm": chance.random() < 0.2,
     }
+
+
+def _return(chance: random.Random, killed: Fault) -> Fault:
+    """Draw a moment at which the region of a DVA that was killed is given back."""
+    back_s = killed.at_s + killed.value + chance.uniform(1.0, 60.0)
+    return Fault(RETURNED, round(min(back_s, CALM), 3), target=killed.target)
 
 
 def _fault(chance: random.Random, dvas: list[str], devices: list[str]) -> Fault:
@@ -113,6 +128,8 @@ class RegionalStorm:
         self.interference = Interference(clock, self._arrives)
         assert isinstance(self.run.network, VirtualNetwork)
         self.run.network.interference = self.interference
+        self._supervisor = self.run.stage.device("control-room", 1)
+        self._supervisor.register()
         self.begun: Counter[str] = Counter()
         self._digest = hashlib.blake2b(digest_size=12)
         for fault in plan.faults:
@@ -170,11 +187,24 @@ class RegionalStorm:
         if fault.kind == ALONE:
             clock.call_after(fault.for_s, self._cut_off(self.id_of(fault.target)))
             return
+        if fault.kind == RETURNED:
+            self._give_back(fault.target.removeprefix("dva-"))
+            return
         chance = random.Random(f"{self.plan.seed} {fault!r}")
         scene: Any = self  # faults of messages need its interference and its labels
         ends = FAULTS[fault.kind].begin(scene, fault, chance)
         if ends is not None:
             clock.call_after(fault.for_s, ends)
+
+    def _give_back(self, region: str) -> None:
+        """Let the supervisor go to the DVA that serves a region, and ask it to give that back."""
+        supervisor = self._supervisor
+        there = (dva for dva in self.run.dvas.values() if not dva.is_gone)
+        serves = next((dva for dva in there if region in page_of(dva).served), None)
+        if serves is not None:
+            supervisor.turn_to(serves.device.id_tag)
+            ask = m.GiveBack(region)
+            self.run.clock.call_after(ASKS_AFTER, supervisor.ask, serves.device.id_tag, ask)
 
     def _cut_off(self, dva: str) -> Callable[[], object]:
         """Cut a DVA off from all but detectors, both ways; return what ends that."""

@@ -9,12 +9,13 @@ from typing import Any
 from helpers.mutation.device_bugs import DEVICE_BUGS
 from helpers.mutation.dva_bugs import DVA_BUGS
 from helpers.mutation.planting import Bug, Planted
+from helpers.mutation.regional_bugs import REGIONAL_BUGS
 from helpers.mutation.robot_bugs import ROBOT_BUGS
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 
-BUGS = {bug.name: bug for bug in (*ROBOT_BUGS, *DVA_BUGS, *DEVICE_BUGS)}
+BUGS = {bug.name: bug for bug in (*ROBOT_BUGS, *DVA_BUGS, *DEVICE_BUGS, *REGIONAL_BUGS)}
 
 
 def named(name: str) -> list[Bug]:

@@ -7,9 +7,11 @@ from functools import partial
 
 from helpers.mutation.bugs import BUGS, planted
 from helpers.mutation.planting import Bug
+from helpers.mutation.regional_bugs import REGIONAL_BUGS
 from helpers.mutation.scores import Trial
 
 from dva_sim.storms.drawing import draw
+from dva_sim.storms.regional_storm import draw_regions
 from dva_sim.storms.storm import play
 
 
@@ -22,9 +24,10 @@ def hunt(name: str, storms: int) -> Trial:
         RuntimeError: the program does not run with the bug, which so is none.
     """
     began, acts, first, found = time.monotonic(), 0, "", ""
+    plan_of = draw_regions if BUGS[name] in REGIONAL_BUGS else draw
     for seed in range(1, storms + 1):
         with planted(name) as bug:
-            outcome = play(draw(seed), enough=lambda bug=bug: bug.acts > 0)
+            outcome = play(plan_of(seed), enough=lambda bug=bug: bug.acts > 0)
         if outcome.error and not bug.acts:
             raise RuntimeError(f"{name}: {outcome.error}")
         acts, first = acts + bug.acts, first or bug.first
