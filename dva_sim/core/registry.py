@@ -16,6 +16,7 @@ from dva_sim.protocol.devices import (
     FORGET_AFTER,
     GUARD,
     OPERATOR,
+    PEER,
     REMOTE,
     ROBOT,
 )
@@ -28,6 +29,7 @@ LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # for devices, in this 
 DEVICE_BYTES = 175  # of one listed device without its label, at most [B]
 MOST_LISTED = 64
 MAX_DEVICES = 20_000
+DAY = 86_400.0  # [s]
 
 
 @dataclass(slots=True)
@@ -65,11 +67,21 @@ class DeviceEntry:
     def is_new_life(self, message_id: int, timestamp: str) -> bool:
         """Return True if a registration shows that the device has restarted: MessageIDs go back.
 
-        A copy of an earlier registration, sent again or come late, does not say so.
+        A copy of an earlier registration, sent again or come late, does not say so. Between DVAs,
+        whose clocks outlast them, nor does one that was sent before the newest: over a backbone it
+        may have been repeated for minutes.
         """
         if not self.registrations or (message_id, timestamp) in self.registrations:
             return False
-        return message_id <= self.registrations[-1][0]
+        newest, sent = self.registrations[-1]
+        is_late = self.kind == PEER and _is_before(timestamp, sent)
+        return message_id <= newest and not is_late
+
+
+def _is_before(one: str, other: str) -> bool:
+    """Return True if one time of day is before another, by less than half a day."""
+    first, second = (int(t[:2]) * 3600 + int(t[3:5]) * 60 + float(t[6:]) for t in (one, other))
+    return 0.0 < (second - first) % DAY < DAY / 2
 
 
 @dataclass

@@ -122,6 +122,13 @@ class RegionalDva(Dva):
         is_later = isinstance(send.body, m.HandOver | m.EventReport)
         return [] if is_later else super().undelivered(send, now)
 
+    def _gone(self, device: str, now: float) -> list[Send]:
+        """Leave a device that is silent, as in `Dva`; another DVA hears later what is over."""
+        if device in self.division.peers:
+            over = [m.OrderProgress(e.number, "done") for e in self.orders.engaged.all(device)]
+            self.help.unheard.setdefault(device, []).extend(Send(device, body) for body in over)
+        return super()._gone(device, now)
+
     def dismiss(self, device: str, now: float) -> list[Send]:
         """Forget a device at once, as in `Dva`."""
         self.borders.forget(device)
