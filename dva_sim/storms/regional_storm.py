@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.virtual_network import VirtualNetwork
@@ -128,8 +129,9 @@ class RegionalStorm:
         self.interference = Interference(clock, self._arrives)
         assert isinstance(self.run.network, VirtualNetwork)
         self.run.network.interference = self.interference
-        self._supervisor = self.run.stage.device("control-room", 1)
-        self._supervisor.register()
+        supervisor = ControlRoomAgent(self.run.stage.device("control-room", 1))
+        supervisor.start()
+        self._supervisor = supervisor.device
         self.begun: Counter[str] = Counter()
         self._digest = hashlib.blake2b(digest_size=12)
         for fault in plan.faults:

@@ -5,10 +5,16 @@ import signal
 
 import pytest
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.options import scenario_of
 from dva_sim.live.supervisor import free_pairs
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import SocketNetwork
 from dva_sim.options.runs import LiveOptions
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.stage import Stage, id_of
 
 HALL = """
 site: {name: hall}
@@ -59,6 +65,57 @@ def test_a_run_whose_dvas_have_all_been_killed_ends(programs, hall):
             os.kill(process, signal.SIGKILL)
     assert run.ends() == 3
     assert "has ended by itself: killed by signal 9" in run.complained[0]
+
+
+@pytest.fixture
+def network():
+    sockets = SocketNetwork(LiveClock())
+    yield sockets
+    sockets.close()
+
+
+SUPERVISED = "dva.control_rooms={control-room-1: supervise}"
+
+
+@pytest.mark.system
+def test_a_region_is_given_back_to_the_process_of_its_dva(programs, hall, network):
+    addresses = [f"127.0.0.1:{port}" for port in free_pairs(2)]
+
+    def start(number):
+        words = "--only", "dva", "--number", str(number), "--dva", ",".join(addresses)
+        run = programs.start("live", hall, *words, "--no-page", "--set", SUPERVISED)
+        run.wait_to_say(f"DVA: {addresses[number - 1]}")
+        return run
+
+    west, _ = start(1), start(2)
+    clock = network.clock
+    stage = Stage(scenario_of(LiveOptions(str(hall))), 1, network, Recorder())
+    stage.address = lambda kind, number: network.join(id_of(kind, number))
+    agent = ControlRoomAgent(stage.device("control-room", 1))
+    room = agent.device
+    for number, address in enumerate(addresses, 1):
+        room.introduce(id_of("dva", number), address)
+    agent.start()
+    clock.run(clock.now + 3.0)
+    west.send(signal.SIGKILL)
+    run_until(clock, lambda: room.dva == id_of("dva", 2))
+    start(1)
+    answers = []
+
+    def ask():
+        room.ask(id_of("dva", 2), m.GiveBack("west"), answers.append)
+        return not any(reply.code == m.OK for reply in answers)
+
+    clock.every(1.0, ask)
+    run_until(clock, lambda: room.dva == id_of("dva", 1))
+    assert answers[-1].code == m.OK
+
+
+def run_until(clock, holds, within_s=60.0):
+    latest = clock.now + within_s
+    while not holds():
+        assert clock.now < latest
+        clock.run(clock.now + 0.1)
 
 
 @pytest.mark.parametrize(

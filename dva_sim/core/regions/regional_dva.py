@@ -201,7 +201,7 @@ class RegionalDva(Dva):
             case m.Replicate() as copied:
                 return self.deputy.keep(source, copied, now)
             case m.GiveBack() as returned:
-                return self.returns.take(source, returned)
+                return self.returns.take(returned)
         return super()._answer(message, now)
 
     def _copy_to_new_deputies(self) -> None:

@@ -58,13 +58,13 @@ class Returns:
                 return f"{self.orders.label_of(grant.robot)} is driven"
         return None
 
-    def take(self, peer: str, body: m.GiveBack) -> DvaAnswer:
+    def take(self, body: m.GiveBack) -> DvaAnswer:
         """Serve the own region again, as the DVA that has served it wants."""
         own = self.division.own
         known = self.division.claims.get(body.region)
         if known is None or body.epoch is None or self.division.lines[body.region][0] != own:
             return DvaAnswer(m.NOT_SUPPORTED, f"{body.region!r} is not the region of this DVA")
-        if known not in (Claim(body.epoch, own), Claim(body.epoch - 1, peer)):
+        if body.epoch <= known.epoch and known != Claim(body.epoch, own):
             return DvaAnswer(m.STALE, f"the epoch of {body.region} is {known.epoch}")
         self.division.claims[body.region] = Claim(body.epoch, own)
         self.deputy.copies.pop(body.region, None)  # what is open is passed on

@@ -51,14 +51,6 @@ def _says_taken(original: Original, bug: Planted) -> Original:
     return wrong
 
 
-def _obeys_before_it_is_registered(original: Original, bug: Planted) -> Original:
-    def wrong(self: Any, dva: str) -> None:
-        bug.act(f"{self.label} obeys {dva} at once")
-        self._obey(dva)
-
-    return wrong
-
-
 _DEPUTY: Final = "dva_sim.core.regions.takeover:Deputy"
 _DIVISION: Final = "dva_sim.core.regions.division:Division"
 _HELP: Final = "dva_sim.core.regions.help:MutualHelp"
@@ -86,13 +78,6 @@ REGIONAL_BUGS: Final = (
         "a deputy takes a region over, and leaves its events alone",
         f"{_DEPUTY}.resume",
         skipped(lambda self, now: any(self.copies.get(region) for region in self.taken_over)),
-    ),
-    Bug(
-        "unreplicated-unsaid",
-        "S13",
-        "a report without a copy is answered like one with it",
-        f"{_AGENT}._unreplicated",
-        instead(lambda self, reply: reply),
     ),
     Bug(
         "strays-untold",
@@ -137,13 +122,6 @@ REGIONAL_BUGS: Final = (
         _keeps_the_epoch,
     ),
     Bug(
-        "nobody-takes-over",
-        "S8",
-        "a deputy waits for ever for somebody to come",
-        f"{_DEPUTY}._has_come",
-        afterwards(lambda self, has_come, *_: False if has_come else None),
-    ),
-    Bug(
         "forgetful-deputy-not-replaced",
         "S8",
         "a DVA that has forgotten what it had taken over is left alone",
@@ -154,13 +132,6 @@ REGIONAL_BUGS: Final = (
                 for region, claim in self.division.claims.items()
             )
         ),
-    ),
-    Bug(
-        "responder-forgotten",
-        "S6",
-        "a deputy goes on with an event and forgets who is sent there",
-        f"{_DEPUTY}._keep_at_it",
-        skipped(),
     ),
     Bug(
         "help-never-ends",
@@ -186,13 +157,6 @@ REGIONAL_BUGS: Final = (
         "a guard obeys whichever DVA sends him an order",
         "dva_sim.agents.people.guard_protocol:GuardProtocol.handle",
         _obeys_whoever_orders,
-    ),
-    Bug(
-        "obeys-unregistered",
-        "S12",
-        "a device obeys a DVA that has not confirmed it yet",
-        "dva_sim.agents.device:AgentDevice.turn_to",
-        _obeys_before_it_is_registered,
     ),
     Bug(
         "passed-on-into-nothing",
