@@ -8,6 +8,8 @@ import pytest
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import simulate
 from dva_sim.simulation.run_measures import RunMeasure, load_measure
 from dva_sim.testing.measures import check_measure
 from dva_sim.testing.promises import tried
@@ -55,6 +57,27 @@ def test_the_shipped_example_keeps_its_promises():
     name = "nearest_person.py:NearestPerson"
     assert tried(check_measure, name, slow=60.0).broken == ()
     assert checks.check(["measure", name], []) == 0
+
+
+def test_what_a_dead_dva_never_heard_of_counts_as_unattended():
+    at_a_guard = {"kind": "flood", "position": [12, 4], "reported": True}
+    plan = {
+        "site": {"name": "hall"},
+        "robot": {"count": 0},
+        "operator": {"count": 0},
+        "guard": {"count": 1, "mobilisation_s": 1},
+        "events": [at_a_guard | {"at_s": 5}, at_a_guard | {"kind": "fire", "at_s": 80}],
+        "dva": {"deaths": [{"at_s": 70}]},
+        "horizon_s": 100,
+    }
+    recording = simulate(scenarios.build(plan), 1)
+    response, share = (
+        load_measure(f"arrivals.py:{name}").of(recording)
+        for name in ("NoticedResponse", "Unattended")
+    )
+    assert share == 0.5
+    (event,) = recording.events
+    assert response == pytest.approx((event.times["arrived"] - 5.0 + 100.0) / 2)
 
 
 @pytest.mark.parametrize(
