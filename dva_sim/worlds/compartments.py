@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.maps import OccupancyGrid, cells_inside, segments
 from dva_sim.worlds.site_parts import CEILING, Compartment, Lookup, Opening, Room, beyond
 
@@ -19,6 +20,8 @@ Labels = NDArray[np.int16]
 
 NOWHERE = -1  # label of cells in no compartment
 BLOCK = 8.0  # side of a block of a bare map's floor [m]
+MOST_BLOCKS = 2000  # on a larger floor they are larger
+MOST_PIECES = 4000  # of a floor in its blocks: each is compared with each
 LEAST_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
 LEAST_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
 NEAR = 0.05  # rooms this near to each other touch [m]
@@ -161,18 +164,21 @@ def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
 
     labels = np.full(floor.shape, NOWHERE, np.int16)
     found = 0
-    rows, columns = (_cuts(length, resolution) for length in floor.shape)
+    across = max(BLOCK / resolution, math.sqrt(np.count_nonzero(floor) / MOST_BLOCKS))
+    rows, columns = (_cuts(length, across) for length in floor.shape)
     for top, bottom in itertools.pairwise(rows):
         for left, right in itertools.pairwise(columns):
             part, count = label(floor[top:bottom, left:right])
             labels[top:bottom, left:right][part > 0] = part[part > 0] + (found - 1)
             found += count
+            if found > MOST_PIECES:
+                raise ConfigError(f"the floor of a map has more than {MOST_PIECES:,} pieces")
     return labels
 
 
-def _cuts(length: int, resolution: float) -> list[int]:
-    """Return where a side of so many cells is cut into blocks of equal length."""
-    blocks = max(1, round(length * resolution / BLOCK))
+def _cuts(length: int, across: float) -> list[int]:
+    """Return where a side of so many cells is cut into blocks of equal length, about `across`."""
+    blocks = max(1, round(length / across))
     return [round(length * number / blocks) for number in range(blocks + 1)]
 
 

@@ -31,6 +31,9 @@ NEAR_SHADE = 10  # shades this near may have been that one
 FEW = 0.01  # share of a scale map that may have that shade by chance
 JPEG_BLUR = 12.0  # by how much the shades of a JPEG may be off: a half step to white
 USUAL_CELLS = 0.005, 1.0  # of a map [m]
+MOST_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
+LARGEST = 5e3  # side of a map [m]
+FARTHEST = 1e7  # of a map from its origin [m]: coordinates of UTM are below
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +198,9 @@ def _in_small(value: Any) -> Any:
     return value.lower() if isinstance(value, str) else value
 
 
+Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+
+
 class RosMap(Config):
     """The YAML file of a ROS map, as map_server reads it; keys of other tools are left alone.
 
@@ -205,8 +211,8 @@ class RosMap(Config):
     model_config = ConfigDict(extra="ignore")
 
     image: str
-    resolution: Annotated[float, Field(gt=0)]
-    origin: tuple[float, float, float]
+    resolution: Annotated[float, Field(ge=1e-3, le=5)]
+    origin: tuple[Coordinate, Coordinate, Coordinate]
     negate: Annotated[bool, BeforeValidator(_as_bool)] = False
     occupied_thresh: Annotated[float, Field(ge=0, le=1)]
     free_thresh: Annotated[float, Field(ge=0, le=1)]
@@ -296,6 +302,7 @@ def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64
         file = beside(document.file, config.image)
     try:
         with Image.open(file) as opened:
+            _check_size(opened.size, document, config)
             blur = JPEG_BLUR if opened.format == "JPEG" else 0.0
             if opened.format == "PPM" and _most_shades(file) != 255:
                 blur = 1.0  # shades are scaled, and rounded
@@ -315,6 +322,19 @@ def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64
         # map_server averages all bands of a trinary map, opacity among them.
         return np.asarray(pixels.mean(axis=2)), blur
     return np.where(pixels[..., -1] > 0, pixels[..., :-1].mean(axis=2), np.nan), blur
+
+
+def _check_size(size: tuple[int, int], document: Document, config: RosMap) -> None:
+    """Refuse an image whose map would take gigabytes, or that is no building's."""
+    columns, rows = size
+    if columns * rows > MOST_CELLS:
+        problem = (
+            f"image {config.image!r} is {columns} by {rows}, at most {MOST_CELLS / 1e6:g} million"
+        )
+        raise document.error(f"{problem} pixels", ("image",))
+    if (side := max(size) * config.resolution) > LARGEST:
+        problem = f"cells of {config.resolution:g} m make a map {side:,.0f} m long"
+        raise document.error(f"{problem}, at most {LARGEST:,.0f}", ("resolution",))
 
 
 def _most_shades(file: Path) -> int:

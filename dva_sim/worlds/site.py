@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -31,7 +32,15 @@ from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_ro
 from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.geojson import Feature, doubts_of_plan, read_features
-from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise, side
+from dva_sim.worlds.maps import (
+    FREE,
+    MOST_CELLS,
+    OccupancyGrid,
+    load_ros_map,
+    outline,
+    rasterise,
+    side,
+)
 from dva_sim.worlds.office_block import OfficeBlock, office_block
 from dva_sim.worlds.site_parts import (
     CEILING,
@@ -254,10 +263,10 @@ class Site(FloorPlan):
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
 PLANS = (".geojson", ".json")
-MOST_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
 DESKS = 2  # operator desks on a bare map
 BASE_SPACING = 1.5  # between places that are not drawn [m]
 PASSED_BY = 0.5  # radius that must fit at them on a plan: more than the doors have, mostly [m]
+MOST_DETECTORS = 2000  # of a kind on a bare map; on a larger floor they are further apart
 AT_RANDOM = 100  # tries, before what is left is looked at cell by cell
 DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a bare map [m]
 
@@ -435,8 +444,9 @@ class _Places:
 def _lattice(grid: OccupancyGrid, reached: NDArray[np.bool_]) -> tuple[Detector, ...]:
     """Detectors on square lattices of cells that can be reached."""
     detectors = []
+    sparse = math.ceil(math.sqrt(np.count_nonzero(reached) / MOST_DETECTORS))
     for kind, spacing in DETECTOR_SPACING.items():
-        step = max(1, round(spacing / grid.resolution))
+        step = max(1, round(spacing / grid.resolution), sparse)
         rows, columns = np.nonzero(reached[step // 2 :: step, step // 2 :: step])
         points = grid.to_xy(rows * step + step // 2 + 0.5, columns * step + step // 2 + 0.5)
         for number, (x, y) in enumerate(points.tolist(), 1):

@@ -144,6 +144,12 @@ def test_places_on_a_bare_map_depend_on_the_seed_and_not_on_the_size_of_the_team
     assert {d.kind for d in small.detectors} == {"smoke", "gas", "water"}
 
 
+def test_a_square_kilometre_without_walls_has_few_larger_blocks_and_few_detectors(tmp_path):
+    site = map_site(write_map(tmp_path, np.full((250, 250), 254), resolution=4), 1, 0, 0)
+    assert 1000 < len(site.compartments) < 2100
+    assert 3000 < len(site.detectors) < 6600
+
+
 @pytest.mark.parametrize("draw", [hall, racks])
 def test_the_maps_for_tests_are_what_their_script_makes(draw):
     with Image.open(MAPS / f"{draw.__name__}.png") as image:

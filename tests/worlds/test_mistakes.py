@@ -10,10 +10,11 @@ from helpers.worlds.small_map import write_map
 from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
 from dva_sim.cli import site
+from dva_sim.worlds.compartments import of_floor
 from dva_sim.worlds.drives import DriveSpec, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import make_hazard
-from dva_sim.worlds.maps import load_ros_map
+from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid, load_ros_map
 from dva_sim.worlds.physics import World, hall
 from dva_sim.worlds.site import load_site, map_site
 from dva_sim.worlds.site_export import write_site as export
@@ -56,6 +57,16 @@ def plan_text(text):
 
 def ros_map(changes):
     load_ros_map(write_map(Path(), [[254]], **changes))
+
+
+def large_map(rows, columns):
+    load_ros_map(write_map(Path(), np.full((rows, columns), 254, np.uint8), resolution=3))
+
+
+def speckled(side):
+    """A floor on which no two cells touch."""
+    cells = np.indices((side, side)).sum(axis=0) % 2 * OCCUPIED
+    of_floor(OccupancyGrid(1.0, Pose(0, 0, 0), cells), cells == FREE)
 
 
 def map_of(path):
@@ -169,10 +180,18 @@ SITES = [
         ros_map,
         ({"resolution": None}, "missing 'resolution'"),
         ({"resolution": -1}, "map.yaml:2:1: resolution"),
+        ({"resolution": 1e19}, "map.yaml:2:1: resolution: 5"),
+        ({"origin": "[1.0e308, 0, 0]"}, "map.yaml:3:10: origin.0:"),
         ({"image": "gone.pgm"}, "map.yaml:1:1: 'gone.pgm'"),
         ({"image": "map.yaml"}, "image 'map.yaml'"),
         ({"free_thresh": 0.9}, "free_thresh 0.9 occupied_thresh 0.65"),
     ),
+    *mistakes(
+        large_map,
+        (1, 2000, "map.yaml:2:1: 6,000 5,000"),
+        (6500, 6500, "map.yaml:1:1: 'map.pgm' 6500 40 million"),
+    ),
+    *mistakes(speckled, (90, "floor 4,000 pieces")),
     *mistakes(narrow_map, ([[0, 254, 0]], "floor robot")),
     *mistakes(map_of, ("nowhere/gone.yaml", "nowhere/gone.yaml not found")),
 ]
