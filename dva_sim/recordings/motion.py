@@ -29,6 +29,8 @@ UNITS: Final = (
 )
 COLUMNS: Final = "t_s,came_s,at_s,x_mps2,y_mps2,z_mps2,orientation_deg"
 APP: Final = "# app "
+LONGEST_S: Final = 1e6  # of a run: ten days
+STRONGEST_MPS2: Final = 1e5  # along an axis: ten times what breaks a phone
 MOST_BYTES: Final = 64_000_000  # of a file: about two hours at 60 samples a second
 
 
@@ -164,7 +166,7 @@ def _take(motion: PhoneMotion, line: str, path: Path, number: int) -> None:
             motion.apps.append(_app(json.loads(line[len(APP) :])))
         elif line and not line.startswith("#") and line != COLUMNS:
             motion.samples.append(_sample(line))
-    except (ValueError, KeyError, TypeError, ConfigError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError, ConfigError) as error:
         raise ConfigError(f"should be {COLUMNS}: {error}", path, number, 1) from None
 
 
@@ -173,7 +175,12 @@ def _sample(line: str) -> MotionSample:
     angle = int(orientation)
     if angle not in ORIENTATIONS:
         raise ValueError(f"orientation_deg {angle}")
-    return MotionSample(float(stamp), float(came), float(at), (float(x), float(y), float(z)), angle)
+    times = float(stamp), float(came), float(at)
+    axes = float(x), float(y), float(z)
+    bounds = zip((*times, *axes), (*(LONGEST_S,) * 3, *(STRONGEST_MPS2,) * 3), strict=True)
+    if not all(abs(value) <= bound for value, bound in bounds):
+        raise ValueError("a value that no phone's sensor has")
+    return MotionSample(*times, axes, angle)
 
 
 def _app(content: dict[str, Any]) -> MotionApp:
@@ -181,6 +188,8 @@ def _app(content: dict[str, Any]) -> MotionApp:
     profile = validate(PhoneProfile, content["profile"], lambda problem, _: ConfigError(problem))
     at = float(content["at_s"])
     period = float(content["period_s"])
+    if not (abs(at) <= LONGEST_S and 1e-4 <= period <= LONGEST_S):
+        raise ValueError("an app at no time of a run")
     return MotionApp(at, period, (x, y, z), content["ios"] is True, profile)
 
 

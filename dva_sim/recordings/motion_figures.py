@@ -15,6 +15,7 @@ from dva_sim.recordings.motion import MotionSample, PhoneMotion
 GAP: Final = 3.0  # median intervals: a longer one is a gap
 AT_REST: Final = 2.0  # the quietest stretch of so long counts as rest [s]
 LEAST: Final = 30  # samples
+LEAST_STEP_S: Final = 1e-6  # between two of them: those nearer are of one moment
 
 
 class MotionFigures(NamedTuple):
@@ -55,7 +56,9 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
     samples = motion.samples
     if len(samples) < LEAST:
         raise ConfigError(f"contains {len(samples)} samples; at least {LEAST} are needed", path)
-    steps = [b.stamp - a.stamp for a, b in pairwise(samples) if b.stamp > a.stamp]
+    steps = [step for a, b in pairwise(samples) if (step := b.stamp - a.stamp) >= LEAST_STEP_S]
+    if not steps:
+        raise ConfigError("contains samples of one moment only", path)
     usual = median(steps)
     even = [step for step in steps if step <= GAP * usual]
     late = [sample.came - sample.at for sample in samples if not math.isnan(sample.came)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
@@ -22,6 +23,10 @@ PACKED = {
     b"BZh": "bzip2",
     b"PK\x03\x04": "zip",
 }  # how files begin that were compressed as a whole
+_DAMAGED = (
+    *(ValueError, KeyError, TypeError, struct.error),  # of fields that do not belong together
+    *(OverflowError, MemoryError, RecursionError),  # of lengths and depths that nothing has
+)
 CUT = "is damaged, or was cut short before anything of the run"
 
 
@@ -30,15 +35,17 @@ class _Exactly:
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
+        self._left = file.seek(0, os.SEEK_END)
+        file.seek(0)
 
     def read(self, length: int) -> bytes:
-        """The next bytes."""
+        """The next bytes; no memory is taken for more than there are."""
         from mcap.exceptions import EndOfFile
 
-        data = self._file.read(length)
-        if len(data) < length:
+        self._left -= length
+        if self._left < 0:
             raise EndOfFile
-        return data
+        return self._file.read(length)
 
 
 class DamagedError(Exception):
@@ -95,7 +102,7 @@ class RawRecords:
         except InvalidMagic:
             file.seek(0)
             raise DamagedError(_other_form(file.read(8)) if not self.files else NO_END) from None
-        except (McapError, ZstdError, ValueError, KeyError, struct.error, MemoryError) as error:
+        except (McapError, ZstdError, *_DAMAGED) as error:
             raise DamagedError(f"is damaged: {' '.join(str(error).split())[:200]}") from None
         if self.about is None and not self.is_cut:
             raise DamagedError(self._not_ours())

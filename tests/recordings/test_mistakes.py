@@ -1,16 +1,20 @@
 """Mistakes in what is recorded, drawn and read, told before anything runs."""
 
 import math
+import struct
 from pathlib import Path
 
 from helpers.mistakes import Refused, check_mistake, command, each_mistake, mistakes, of_file
 
 from dva_sim.options.runs import PictureOptions
+from dva_sim.recordings.motion import APP, COLUMNS, FIRST_LINE, UNITS, read_motion
+from dva_sim.recordings.motion_figures import figures_of
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.sensor_log import read_sensor_log
 from dva_sim.simulation import scenario as scenarios
 
+MAGIC = b"\x89MCAP0\r\n"
 LEAK = {"kind": "steam_leak.py:SteamLeak", "room": "Chemistry lab", "at_s": 5.0}
 
 
@@ -34,6 +38,11 @@ def recording(name):
 def log(rows, head="t,x,y,z", unit=None):
     Path("log.csv").write_text(f"{head}\n{rows}")
     read_sensor_log(Path("log.csv"), unit)
+
+
+def motion(rows):
+    Path("motion-1.csv").write_text("\n".join([FIRST_LINE, *UNITS, COLUMNS, rows]))
+    figures_of(read_motion(Path("motion-1.csv")), Path("motion-1.csv"))
 
 
 def turning(size, hertz):
@@ -63,6 +72,15 @@ LOGS = mistakes(
     (still() + "0.2,0,0,9.8\n", "log.csv:102 time"),
     (still() + "nan,0,0,9.8\n", "log.csv:102"),
     (still(unit=1e15), "log.csv time (ms)"),
+    (still() + "0.99,1e300,0,9.8\n", "log.csv:102 sensor"),
+)
+ONE_MOMENT = "0,0,0,0,0,9.8,0\n" * 30
+MOTION = mistakes(
+    motion,
+    ("1e300,0,0,0,0,9.8,0\n", "motion-1.csv:5 sensor"),
+    ("0,0,0,0,0,nan,0\n", "motion-1.csv:5 sensor"),
+    (APP + '{"at_s": 1e300, "period_s": 0.1}\n', "motion-1.csv:5"),
+    (ONE_MOMENT, "motion-1.csv moment"),
 )
 MISTAKES = [
     *mistakes(
@@ -96,6 +114,9 @@ MISTAKES = [
         of_file(recording, "odd.mcap"),
         ("", "odd.mcap cut short"),
         ("<xml>not at all</xml>" * 10, "odd.mcap not a recording"),
+        (MAGIC + struct.pack("<BQ", 0x0F, 2**63), "odd.mcap damaged"),
+        (MAGIC + struct.pack("<BQI", 1, 40, 2**31), "odd.mcap cut short"),
+        (MAGIC + struct.pack("<BQQQII", 9, 99, 0, 0, 0, 0) + b"\xff" * 8, "odd.mcap cut short"),
     ),
     *mistakes(recording, ("none.mcap", "none.mcap file")),
     *mistakes(
@@ -115,6 +136,6 @@ MISTAKES = [
 ]
 
 
-@each_mistake([*LOGS, *MISTAKES])
+@each_mistake([*LOGS, *MOTION, *MISTAKES])
 def test_a_mistake_ends_in_one_line_with_its_names(tmp_path, act, error, names):
     check_mistake(tmp_path, act, error, names)
