@@ -266,7 +266,7 @@ def verify(path: Path) -> Verified:
     with closing(_opened(path)) as file:
         try:
             return _followed(file)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, TypeError) as error:
             return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log: {error}"))
 
 

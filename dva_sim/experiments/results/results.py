@@ -18,12 +18,16 @@ from html import escape
 from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
 
-from dva_sim.experiments.study.parts import DESIGN, REPEATS
+from dva_sim.experiments.study.designs import MOST_RUNS
+from dva_sim.experiments.study.parts import DESIGN, REPEATS, Level
+from dva_sim.experiments.study.study import Status, Study
+from dva_sim.kernel.config import Config, Scalar, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint, listed
 from dva_sim.kernel.units import unit_of
@@ -243,6 +247,35 @@ def missing_tables(reasons: Mapping[str, str]) -> str:
     return "; ".join(f"table {name!r} cannot be made: {why}" for name, why in reasons.items())
 
 
+class _Cell(Config):
+    """A configuration of a study."""
+
+    part: str
+    cell: Annotated[int, Field(ge=-1, le=MOST_RUNS)]
+    config: str
+    levels: dict[str, Level]
+
+
+class _Manifest(Config):
+    """Form of a manifest, as far as it is read; the study's is that of its file."""
+
+    model_config = ConfigDict(extra="allow")
+
+    study: Study
+    question: str = ""
+    status: Status | None = None
+    scenarios: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    set: list[str | tuple[str, Any]] = Field(default_factory=list)
+    changes: dict[str, Any] = Field(default_factory=dict)
+    cells: list[_Cell] = Field(default_factory=list)
+    runs: Annotated[int, Field(ge=0, le=MOST_RUNS)] = 0
+    versions: dict[str, str | bool | None] = Field(default_factory=dict)
+    stopped: dict[str, int | str | None] | None = None
+    failures: list[dict[str, Scalar]] = Field(default_factory=list)
+    tables: dict[str, str] = Field(default_factory=dict)
+    columns: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Results:
     """Results of a study.
@@ -275,10 +308,11 @@ class Results:
             manifest = json.loads(path.read_text(encoding="utf-8"))
         except (FileNotFoundError, NotADirectoryError):
             raise ConfigError(_not_results(Path(folder))) from None
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise ConfigError(f"cannot be read as a manifest: {error}", path) from None
         if not isinstance(manifest, dict) or "study" not in manifest:
             raise ConfigError("is not the manifest of a study", path)
+        validate(_Manifest, manifest, lambda text, _: ConfigError(f"is damaged: {text}", path))
         return cls(Path(folder), manifest)
 
     @property

@@ -100,7 +100,7 @@ def test_a_study_without_a_contrast_depends_on_nothing_that_can_be_told(tmp_path
     assert reading(tmp_path, study={"answer": None}).answer.depends == {}
 
 
-@pytest.mark.parametrize("parts", [{"drive": {"replications": 3}}, {"drive": {}}])
-def test_a_part_may_have_trials_of_its_own(tmp_path, parts):
-    expected = parts["drive"].get("replications", 2)
+@pytest.mark.parametrize(("own", "expected"), [({"replications": 3}, 3), ({}, 2)])
+def test_a_part_may_have_trials_of_its_own(tmp_path, own, expected):
+    parts = {"drive": {"scenario": "drive-to-event"} | own}
     assert reading(tmp_path, study={"parts": parts}).trials_of("drive") == expected

@@ -5,6 +5,9 @@ from helpers.wording import unnamed
 from dva_sim.experiments.report.method import remarks
 
 PERSONS = 4
+STOP = {
+    "stop": {"comparison": "answer", "half_width": 1.0, "batch_persons": 1, "most_persons": 6}
+}
 
 
 def reading(tmp_path, study=None, **facts):
@@ -20,21 +23,22 @@ def test_the_persons_are_those_that_were_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "why", "names"),
+    ("study", "why", "names"),
     [
-        ("stop", "enough", ["4;", "2 of 6 batches", "interval"]),
-        ("budget_s", "budget", ["4;", "2 of 6 batches", "time"]),
-        ("stop", None, ["4;", "All 6 batches"]),
+        (STOP, "enough", ["4;", "2 of 6 batches", "interval"]),
+        ({"budget_s": 60.0}, "budget", ["4;", "2 of 6 batches", "time"]),
+        (STOP, None, ["4;", "All 6 batches"]),
     ],
 )
-def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, names):
+def test_what_decided_the_number_of_persons_is_told(tmp_path, study, why, names):
     stopped = {"rounds": 2, "of": 6, "why": why}
-    reported = remarks(reading(tmp_path, {key: {"half_width": 1.0}}, stopped=stopped))[0]
+    reported = remarks(reading(tmp_path, study, stopped=stopped))[0]
     assert unnamed(reported, *names) == []
 
 
 def test_parts_with_trials_of_their_own_are_told_apart(tmp_path):
-    parts = {"drive": {"replications": 5}, "story": {"replications": None}}
+    trials = {"drive": 5, "story": None}
+    parts = {name: {"scenario": name, "replications": count} for name, count in trials.items()}
     reported = remarks(reading(tmp_path, {"parts": parts}))[0]
     assert unnamed(reported, "5 in drive", "2 in story") == []
 

@@ -1,0 +1,250 @@
+"""Readers of the program, each with samples that it made itself and the uses of what is valid."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from fuzz import mutations as m
+from helpers.paths import ROOT, TESTS
+
+Samples = Callable[[Path], Sequence[Path]]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One kind of input.
+
+    Attributes:
+        name: Name of the kind.
+        samples: Makes files in a folder, and returns those of this kind.
+        mutate: Damage that knows the form.
+        uses: Words of commands in which `{}` is the file and `{folder}` its folder, each followed
+            only while the one before says that the file is valid.
+        read: Function of bytes, for what comes over a wire; then there are no uses.
+        refuses: Errors by which that function refuses.
+        weight: Share of all mutants.
+    """
+
+    name: str
+    samples: Samples
+    mutate: m.Mutation
+    uses: tuple[str, ...] = ()
+    read: Callable[[bytes], object] | None = None
+    refuses: tuple[type[Exception], ...] = ()
+    weight: int = 10
+
+
+def copies(pattern: str, folder: Path) -> list[Path]:
+    """Copy files of the repository, each into a folder of its own."""
+    found = []
+    for number, path in enumerate(sorted(ROOT.glob(pattern))):
+        place = folder / f"{path.stem}-{number}"
+        place.mkdir(parents=True)
+        found.append(Path(shutil.copy(path, place)))
+    return found
+
+
+def made(name: str, words: str, folder: Path) -> list[Path]:
+    """Let the program make a file."""
+    from dva_sim.cli.program import call
+
+    file = folder / "made" / name
+    file.parent.mkdir(parents=True)
+    code = call(words.format(file).split())
+    assert not code, (words, code)
+    return [file]
+
+
+def texts(contents: dict[str, str], folder: Path) -> list[Path]:
+    """Write files, each into a folder of its own."""
+    found = []
+    for name, text in contents.items():
+        file = folder / Path(name).stem / name
+        file.parent.mkdir(parents=True)
+        file.write_text(text)
+        found.append(file)
+    return found
+
+
+def beside(main: str, others: str, folder: Path) -> list[Path]:
+    """Copy a file together with what it names."""
+    folder.mkdir(parents=True)
+    for path in [*ROOT.glob(others), ROOT / main]:
+        shutil.copy(path, folder)
+    return [folder / Path(main).name]
+
+
+def results(name: str, folder: Path) -> list[Path]:
+    """Copy a results folder; the file of that name in it is damaged."""
+    shutil.copytree(TESTS / "data/results-0.7.0", folder / "results")
+    if name != "journal.sqlite":
+        (folder / "results/journal.sqlite").unlink()
+    else:
+        (folder / "results/manifest.json").unlink()
+    if name.endswith(".parquet"):  # a manifest that does not tell which tables are its own
+        path = folder / "results/manifest.json"
+        manifest = json.loads(path.read_text())
+        path.write_text(json.dumps(manifest | {"tables": {}}))
+    return [folder / "results" / name]
+
+
+def a_log(head: str, row: Callable[[int], str]) -> str:
+    return "\n".join([head, *(row(number) for number in range(200))]) + "\n"
+
+
+MOTION = """# dva-sim phone motion 1
+t_s,came_s,at_s,x_mps2,y_mps2,z_mps2,orientation_deg
+"""
+LOGS = {
+    "motion-1.csv": MOTION + a_log("# ", lambda n: f"{n / 60},{n / 60},{n / 60},0,0.{n},9.8,0"),
+    "sensor.csv": a_log("time,x,y,z", lambda n: f"{n / 100},0,0.0{n},9.8"),
+}
+DELAYS = {
+    "delays.csv": a_log("time_s,delay_ms", lambda n: f"{n / 10},{20 + n % 7}"),
+    "ping.log": a_log(
+        "PING 10.0.0.1 (10.0.0.1) 56(84) bytes of data.",
+        lambda n: f"[{1700000000 + n}.5] 64 bytes from 10.0.0.1: icmp_seq={n + 1} ttl=64 "
+        f"time={20 + n % 7}.0 ms",
+    ),
+}
+SMALL_SCENARIO = {"small.yaml": "description: one robot\nhorizon_s: 20\nevents: []\n"}
+LINES = {
+    "rosbridge.json": '{"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.1}}, '
+    '"id": "a", "throttle_rate": 5, "queue_length": 1}',
+    "web.json": '{"id": "a1", "do": "emergency", "robots": "all", "speed_mps": 0.3}',
+}
+
+
+def users(folder: Path) -> list[Path]:
+    from dva_sim.serving.users import UserFile
+
+    folder.mkdir(parents=True)
+    file = UserFile(folder / "users.json")
+    file.add("ana", "drive", "a long password")
+    return [folder / "users.json"]
+
+
+def audit(folder: Path) -> list[Path]:
+    from dva_sim.recordings.audit_log import AuditEntry, AuditLog
+
+    folder.mkdir(parents=True)
+    log = AuditLog(folder / "audit.sqlite")
+    entry = {"time_s": 12.5, "at_utc": "2026-01-01T00:00:00Z", "author": "ana"}
+    log.append([AuditEntry(**entry, action=action) for action in ("acknowledge", "assign")])
+    log.close()
+    return [folder / "audit.sqlite"]
+
+
+def state(folder: Path) -> list[Path]:
+    from dva_sim.core.store import Store
+
+    folder.mkdir(parents=True)
+    Store(folder / "dva.state").close()
+    return [folder / "dva.state"]
+
+
+def read_state(data: bytes) -> None:
+    """Open the memory of a DVA."""
+    import tempfile
+
+    from dva_sim.core.store import Store
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "dva.state")
+        file.write_bytes(data)
+        Store(file).close()
+
+
+def keys(folder: Path) -> list[Path]:
+    from dva_sim.network.keys import create_keys
+
+    create_keys(folder, ["02:00:00:00:00:01"])
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def read_key(data: bytes) -> None:
+    """Read a key as a public and as a secret one."""
+    import tempfile
+
+    from dva_sim.network.keys import KeyRing
+
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("public", "secret"):
+            Path(folder, name).mkdir(mode=0o700)
+            Path(folder, name, "02-00-00-00-00-01.key").write_bytes(data)
+        KeyRing(folder).pair("02:00:00:00:00:01")
+
+
+def read_rosbridge(data: bytes) -> None:
+    from dva_sim.ros import rosbridge
+
+    operation = rosbridge.decode(data)
+    for name in ("op", "topic"):
+        rosbridge.name_in(operation, name)
+    rosbridge.number_in(operation, "throttle_rate", 1e6)
+
+
+def read_web(data: bytes) -> None:
+    from dva_sim.console.web import actions
+
+    actions.read(data)
+
+
+def readers() -> list[Reader]:
+    """Return the table."""
+    from dva_sim.console.wire.kinds import BadMessage
+    from dva_sim.kernel.errors import DvaSimError
+    from dva_sim.ros.rosbridge import BadOperation
+
+    check = ("check {}",)
+    table = ("check {}", "show {folder}", "report {folder}", "export {folder} -o {folder}/x.csv")
+    hall = partial(beside, "tests/data/hall.yaml", "tests/data/hall.png")
+    campus = partial(beside, "worlds/campus.yaml", "worlds/*.geojson")
+    plan = partial(beside, "worlds/caparica.geojson", "worlds/caparica.yaml")
+    record = partial(made, "run.mcap", "episode drive-to-event --record {}")
+    return [
+        Reader("message", partial(copies, "protocol/samples/valid/*.xml"), m.raw, check, weight=30),
+        Reader("study", partial(copies, "experiments/k*.yaml"), m.of_yaml, check, weight=4),
+        Reader(
+            "scenario",
+            partial(texts, SMALL_SCENARIO),
+            m.of_yaml,
+            ("check {}", "episode {}"),
+            weight=4,
+        ),
+        Reader("site", campus, m.of_yaml, ("check {}", "site show {}"), weight=4),
+        Reader("plan", plan, m.of_json, ("check {}", "site show {folder}/caparica.yaml"), weight=4),
+        Reader("map", hall, m.of_yaml, ("site show {}",), weight=6),
+        Reader("trace", partial(copies, "experiments/traces/*"), m.of_lines, check),
+        Reader("delay log", partial(texts, DELAYS), m.of_lines, check, weight=30),
+        Reader("phone log", partial(texts, LOGS), m.of_lines, ("phone-log {}",), weight=30),
+        Reader("recording", record, m.of_mcap, ("check {}", "replay {}"), weight=10),
+        Reader("table", partial(results, "tables/runs.parquet"), m.of_parquet, table[1:], weight=6),
+        Reader("manifest", partial(results, "manifest.json"), m.of_json, table[1:], weight=10),
+        Reader("journal", partial(results, "journal.sqlite"), m.of_sqlite, table[1:2], weight=6),
+        Reader("registration", partial(copies, "experiments/*.registration.yaml"), m.of_yaml, check),
+        Reader("audit log", audit, m.of_sqlite, check),
+        Reader("users", users, m.of_json, ("users list --file {}",)),
+        Reader("state", state, m.of_sqlite, read=read_state, refuses=(DvaSimError,)),
+        Reader("keys", keys, m.of_lines, read=read_key, refuses=(DvaSimError,)),
+        Reader(
+            "rosbridge",
+            partial(texts, {"a.json": LINES["rosbridge.json"]}),
+            m.of_json,
+            read=read_rosbridge,
+            refuses=(BadOperation,),
+        ),
+        Reader(
+            "web",
+            partial(texts, {"a.json": LINES["web.json"]}),
+            m.of_json,
+            read=read_web,
+            refuses=(BadMessage,),
+        ),
+    ]
