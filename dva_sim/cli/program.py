@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli import answers, files, link, results, runs, site, storm, studies, users
+from dva_sim.cli import answers, files, link, load, results, runs, site, storm, studies, users
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
@@ -133,7 +133,7 @@ class DvaSimProgram(PanelGroup):
         ),
         "Single runs": {
             **_named(runs.episode, runs.replay, runs.live, runs.console),
-            **_named(runs.robot, link.link, runs.keys),
+            **_named(runs.robot, link.link, load.load, runs.keys),
             "users": typer_of(UsersGroup, help="Add, change and lock users of a console."),
         },
         "Listing, checking and validation": {

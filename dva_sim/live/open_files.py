@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import resource
-from typing import Final
+from typing import Final, NamedTuple
 
 from dva_sim.core.registry import MAX_DEVICES
 from dva_sim.kernel.errors import DvaSimError
@@ -12,9 +12,20 @@ PER_DEVICE: Final = 16  # at the DVA
 APART: Final = 200  # for all else
 
 
-def devices_that_fit() -> int:
+class DeviceRoom(NamedTuple):
+    """Devices that fit, and the files that may be open."""
+
+    devices: int
+    files: int
+
+    def __str__(self) -> str:
+        return f"has room for {self.devices:,} devices, with {self.files:,} open files"
+
+
+def room_here() -> DeviceRoom:
     """Return how many devices fit, with as many open files as the system allows."""
-    return max(1, min(MAX_DEVICES, (_usable() - APART) // PER_DEVICE))
+    usable = _usable()
+    return DeviceRoom(max(1, min(MAX_DEVICES, (usable - APART) // PER_DEVICE)), usable)
 
 
 def check_room_for(devices: int) -> None:

@@ -25,7 +25,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.rates import Rate
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.kept_facts import keep_events, keep_places, keep_team
-from dva_sim.live.open_files import devices_that_fit
+from dva_sim.live.open_files import room_here
 from dva_sim.live.options import ROSBRIDGE, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines
 from dva_sim.network.messaging import Transport
@@ -104,7 +104,9 @@ class DvaPart:
         self.agent = add_dva(
             stage, permissions, memory, keep_events=False, number=number, life=life
         )
-        self.agent.core.registry.most = devices_that_fit()
+        room = room_here()
+        self.agent.core.registry.most = room.devices
+        self.agent.device.tell(str(room), "link")
         self.agent.stopwatch = time.perf_counter
         trace = _trace_of("dva", stage, options)
         if trace is not None and stage.regions is None:

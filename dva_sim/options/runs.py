@@ -308,3 +308,39 @@ class RobotOptions(PageOptions):
     ] = None
     seed: RunSeed = 1
     set: Changes = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, match_args=False)
+class LoadOptions:
+    """Options of `load`: how much of what, at which DVA, and for how long."""
+
+    dva: Annotated[
+        str | None,
+        OptionForm("Address of a DVA; default: one is started.", metavar="HOST:PORT"),
+    ] = None
+    pid: Annotated[
+        int | None, OptionForm("With --dva: its process here, to measure memory and files.")
+    ] = None
+    host: Host = LOCALHOST
+    devices: Annotated[int, OptionForm("Number of devices.", least=1, most=20_000)] = 100
+    sessions: Annotated[int, OptionForm("Number of robots driven.", most=2_000)] = 5
+    status_hz: Annotated[float, OptionForm("Status messages of a device.", metavar="HZ")] = 1.0
+    command_hz: Annotated[float, OptionForm("Commands in a session.", metavar="HZ")] = 10.0
+    reports: Annotated[
+        float, OptionForm("Events reported in a minute.", metavar="N", above=-1.0)
+    ] = 30.0
+    churn: Annotated[
+        float, OptionForm("Devices that vanish or return in a minute.", metavar="N", above=-1.0)
+    ] = 30.0
+    duration: Annotated[
+        float, OptionForm("How long to measure.", names=("--for",), metavar="SECONDS")
+    ] = 30.0
+    until_it_breaks: Annotated[
+        bool, OptionForm("Double the devices until requests are lost, refused or late.")
+    ] = False
+    processes: Annotated[
+        int, OptionForm("Number of processes that make the load.", least=1, most=16)
+    ] = 1
+    out: Annotated[Path | None, out_form("Save the figures: X.csv.", "FILE")] = None
+    overwrite: Overwrite = False
+    seed: RunSeed = 1

@@ -45,6 +45,7 @@ COMMANDS = {
     "users": "users list --file {out}/users.json",
     "robot": f"robot {NOBODY}",
     "link": f"link {NOBODY} --near true --far true",
+    "load": f"load --dva {NOBODY}",
 }
 PREFIX = "start-up: "
 REPEATS = 3

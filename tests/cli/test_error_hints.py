@@ -45,7 +45,7 @@ def test_signs_that_a_terminal_lacks_are_shown_as_plain_ones(tmp_path, encoding)
 
 def test_too_few_open_files_are_told_with_how_many_it_takes(monkeypatch):
     monkeypatch.setattr(open_files, "_usable", lambda: 64)
-    assert open_files.devices_that_fit() == 1
+    assert open_files.room_here().devices == 1
     with pytest.raises(DvaSimError) as error:
         open_files.check_room_for(6)
     assert unnamed(str(error.value), "64 files", "6 devices", "ulimit -n") == []

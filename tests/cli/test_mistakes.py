@@ -83,6 +83,10 @@ WORDS = mistakes(
     ("link --near a --far b -o counts.txt", "counts.txt .csv"),
     ("link --near a --far b -o kept.csv", "kept.csv --overwrite"),
     ("link --near a --far b -o kept.csv/x.csv", "kept.csv"),
+    ("load --dva nowhere", "--dva nowhere"),
+    ("load --pid 1", "--pid --dva"),
+    ("load --devices 10 --sessions 5", "--devices 10: 11 5 sessions 1 processes"),
+    ("load -o figures.txt", "figures.txt .csv"),
     error=Refused,
 )
 CALLS = [

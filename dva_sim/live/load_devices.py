@@ -1,0 +1,274 @@
+"""Devices that put load on a DVA, in a process of their own: `python -m ... JSON`.
+
+They are devices like any other: they register, beat, publish, report and obey by the client that
+robots and guards use. Robots and guards here have no body: they answer what they are sent.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from random import Random
+from typing import Final
+
+from dva_sim.agents.device import STATUS, AgentDevice
+from dva_sim.kernel.errors import DvaSimError, error_line
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.live.open_files import check_room_for
+from dva_sim.live.process import ending_when_asked
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.stage import DVA, TYPES, id_of, label_of
+from dva_sim.worlds.site import DEFAULT_FRAME
+
+GUARDS: Final = 0.2  # design: share of the devices that are not in a session
+TIMEOUT: Final = 2.0  # design: a request without a reply for so long is lost [s]
+PLACES: Final = tuple((2.0 + 4.0 * n, 12.0) for n in range(10))  # design: in a corridor [m]
+APART: Final = 4096  # design: numbers of devices between two processes
+LONGEST: Final = 3600.0  # design: an orphan ends by then [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadShare:
+    """Share of a load that one process makes.
+
+    Attributes:
+        dva: Address of the DVA.
+        host: Address that the devices listen on.
+        number: Number of the process, from 0.
+        devices: Number of devices, those in sessions and the detector that reports included.
+        sessions: Number of operators who drive a robot each.
+        status_hz: Status messages that each device publishes in a second.
+        command_hz: Commands that each operator sends in a second.
+        reports_hz: Events that the process reports in a second.
+        churn_hz: Devices that vanish in a second, and come again with a new life.
+        duration: Time over which it measures [s].
+        settle: Time for all to join before that [s].
+        seed: Seed of positions and of who vanishes.
+    """
+
+    dva: str
+    host: str
+    number: int
+    devices: int
+    sessions: int
+    status_hz: float
+    command_hz: float
+    reports_hz: float
+    churn_hz: float
+    duration: float
+    settle: float
+    seed: int
+
+
+@dataclass
+class LoadCounts:
+    """Counts of one process, as it sends them to its parent.
+
+    Attributes:
+        trips: Time from each request to its reply [s], by kind of request.
+        refused: Refusals by kind and code.
+        lost: Requests without a reply, by kind.
+        published: Messages that were published.
+        reported: Place of each event that was reported, and when, by the machine's clock [s].
+        ordered: Place of each event that somebody was sent to, and when, by the same.
+        joined: Number of devices that are registered at the end.
+    """
+
+    trips: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    refused: Counter[str] = field(default_factory=Counter)
+    lost: Counter[str] = field(default_factory=Counter)
+    published: int = 0
+    reported: list[tuple[str, float]] = field(default_factory=list)
+    ordered: list[tuple[str, float]] = field(default_factory=list)
+    joined: int = 0
+
+
+def place_of(position: m.Position) -> str:
+    """Return the name of an event's place, as both its report and its order have it."""
+    return f"{position.latitude:.5f},{position.longitude:.5f}"
+
+
+class LoadDevices:
+    """The devices of one process.
+
+    Args:
+        network: Their sockets.
+        share: What they do.
+    """
+
+    def __init__(self, network: SocketNetwork, share: LoadShare) -> None:
+        self._network = network
+        self._share = share
+        self._rng = Random(f"{share.seed}/{share.number}")
+        self._begins = 0.0
+        self._joined: set[str] = set()
+        self._commanded: set[str] = set()
+        self._vanished: deque[AgentDevice] = deque()
+        self.counts = LoadCounts()
+        network.introduce(DVA, share.dva)
+        self._detector = self._device("detector", 0)
+        guards = int(GUARDS * (share.devices - 2 * share.sessions - 1))
+        others = share.devices - share.sessions - guards - 1
+        self._guards = [self._device("guard", number) for number in range(guards)]
+        self._robots = [self._device("robot", number) for number in range(others)]
+        self._operators = [self._device("operator", number) for number in range(share.sessions)]
+
+    def begin(self) -> None:
+        """Let all join, evenly over the first half of the time to settle, and do their work."""
+        clock = self._network.clock
+        share = self._share
+        everybody = [self._detector, *self._robots, *self._guards, *self._operators]
+        for number, device in enumerate(everybody):
+            device.serve(partial(self._obey, device))
+            clock.call_after(share.settle / 2 * number / len(everybody), self._join, device)
+        clock.call_after(share.settle, self._measure)
+        for operator, robot in zip(self._operators, self._robots, strict=False):
+            clock.call_after(0.7 * share.settle, self._request_session, operator, robot)
+        if share.reports_hz:
+            clock.every(1 / share.reports_hz, self._report, clock.now + share.settle)
+        if share.churn_hz:
+            clock.every(1 / share.churn_hz, self._churn, clock.now + share.settle)
+
+    def finish(self) -> LoadCounts:
+        """Return the counts."""
+        self.counts.joined = len(self._joined)
+        return self.counts
+
+    def _device(self, kind: str, number: int) -> AgentDevice:
+        number += 1 + APART * self._share.number
+        id_tag = id_of(kind, number)
+        return AgentDevice(
+            id_tag=id_tag,
+            label=label_of(kind, number),
+            device_type=TYPES[kind],
+            address=self._network.join(id_tag, self._share.host),
+            dva=DVA,
+            network=self._network,
+            recorder=Recorder(),
+            frame=DEFAULT_FRAME,
+            timeout=TIMEOUT,
+            attempts=1,
+        )
+
+    def _measure(self) -> None:
+        self._begins = self._network.clock.now
+        self.counts = LoadCounts()
+
+    def _join(self, device: AgentDevice) -> None:
+        device.register(partial(self._joined.add, device.id_tag))
+        if device in self._robots or device in self._guards:
+            self._network.clock.every(1 / self._share.status_hz, partial(self._status, device))
+
+    def _status(self, device: AgentDevice) -> None:
+        if device.id_tag not in self._joined or device.silent:
+            return
+        now = self._network.clock.now
+        at = self._somewhere()
+        robot = m.RobotStatus("Idle", at, 0.0, 0.0, 0.0, int(1000 * now))
+        device.publish(STATUS, robot if device in self._robots else m.PersonStatus("waiting", at))
+        self.counts.published += 1
+
+    def _somewhere(self) -> m.Position:
+        return m.Position(*DEFAULT_FRAME.to_latlon(*self._rng.choice(PLACES)))
+
+    def _timed(
+        self,
+        kind: str,
+        device: AgentDevice,
+        peer: str,
+        body: m.Body,
+        then: Callable[[m.Reply], object] = lambda _: None,
+        session: int = 0,
+    ) -> None:
+        """Send a request, and count how it fares."""
+        clock = self._network.clock
+        sent = clock.now
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                self.counts.refused[f"{kind}: {m.CODE_NAMES[reply.code]}"] += 1
+            self.counts.trips[kind].append(clock.now - sent)
+            then(reply)
+
+        device.ask(peer, body, answered, lambda: self.counts.lost.update([kind]), session)
+
+    def _request_session(self, operator: AgentDevice, robot: AgentDevice) -> None:
+        def granted(reply: m.Reply) -> None:
+            if isinstance(reply.content, m.Permission) and operator.id_tag not in self._commanded:
+                self._commanded.add(operator.id_tag)
+                period = 1 / self._share.command_hz
+                drive = partial(self._command, operator, robot, reply.content.session)
+                self._network.clock.every(period, drive)
+                self._network.clock.every(1.0, partial(self._look_and_stop, operator, robot))
+
+        wish = m.PermissionRequest(robot.id_tag, "teleoperation")
+        self._timed("session", operator, DVA, wish, granted)
+
+    def _command(self, operator: AgentDevice, robot: AgentDevice, session: int) -> None:
+        command = m.SetTeleOp(self._rng.uniform(0.0, 0.4), 0.0)
+        self._timed("command", operator, robot.id_tag, command, session=session)
+
+    def _look_and_stop(self, operator: AgentDevice, robot: AgentDevice) -> None:
+        self._timed("list", operator, DVA, m.GetDeviceList())
+        self._timed("emergency", operator, robot.id_tag, m.Emergency())
+
+    def _report(self) -> None:
+        at = self._somewhere()
+        self.counts.reported.append((place_of(at), time.monotonic()))
+        report = m.EventReport(None, "fire", at, 0.5, 0.9, "detected")
+        self._timed("report", self._detector, DVA, report)
+
+    def _churn(self) -> None:
+        """Let one device vanish; the one that vanished before comes again."""
+        idle = self._robots[self._share.sessions :]
+        if self._vanished:
+            device = self._vanished.popleft()
+            device.restart()
+            device.register(partial(self._joined.add, device.id_tag))
+        elif idle:
+            device = self._rng.choice(idle)
+            self._vanished.append(device)
+            device.crash()
+
+    def _obey(self, device: AgentDevice, message: m.Message) -> m.Reply:
+        """Answer a request; an order to look is followed by what was found: nothing."""
+        match message.body:
+            case m.Order() as order:
+                self.counts.ordered.append((place_of(order.position), time.monotonic()))
+                refuted = m.EventReport(
+                    order.event_id, order.kind, order.position, 0.0, 0.9, "refuted"
+                )
+                for state in ("departed", "arrived"):
+                    device.progress(order.event_id, state)
+                self._timed("report", device, DVA, refuted)
+        return m.Reply(message.message_id, m.OK, "")
+
+
+def main(argument: str) -> int:
+    """Make one share of a load until its time is up; its counts go to standard output."""
+    share = LoadShare(**json.loads(argument))
+    network = SocketNetwork(LiveClock())
+    try:
+        check_room_for(share.devices)
+        devices = LoadDevices(network, share)
+        devices.begin()
+        with ending_when_asked(network.clock, supervised=True):
+            network.clock.run(min(LONGEST, share.settle + share.duration))
+        json.dump(vars(devices.finish()), sys.stdout)
+    except DvaSimError as error:
+        print(error_line(error), file=sys.stderr)
+        return error.exit_code
+    finally:
+        network.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

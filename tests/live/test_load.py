@@ -1,0 +1,58 @@
+"""Load on a DVA: what counts as broken, and a small load on one that is started for it."""
+
+import csv
+import math
+
+import pytest
+from helpers.processes.command_line import call
+
+from dva_sim.live.load import LoadedDva, figures_of, order_times
+from dva_sim.live.load_devices import LoadCounts
+from dva_sim.options.runs import LoadOptions
+
+NOT_HERE = LoadedDva(None).look(0.0, 1.0)
+
+
+def broken(devices=4, **changed):
+    counts = vars(LoadCounts(trips={"list": [0.01] * 200}, joined=4)) | changed
+    return figures_of(LoadOptions(duration=10.0), devices, [counts], NOT_HERE).broke
+
+
+def test_an_order_belongs_to_the_last_report_of_its_place_that_had_none():
+    reported = [("a", 1.0), ("b", 2.0), ("a", 5.0), ("a", 9.0)]
+    ordered = [("a", 1.5), ("a", 5.25), ("b", 4.0)]
+    assert order_times(reported, ordered) == [0.5, 2.0, 0.25]
+
+
+def test_a_dva_counts_as_broken_by_late_replies_lost_requests_or_missing_devices():
+    assert broken() == ""
+    assert broken(trips={"list": [0.01] * 95 + [1.5] * 5}) == "p99 of replies 1.50 s"
+    assert broken(trips={"list": [0.01] * 200, "command": [9.0]}) == ""  # which is of a robot
+    assert broken(lost={"report": 2}) == ""
+    assert broken(lost={"report": 3}) == "3 of 203 requests lost or refused"
+    assert broken(refused={"report: BUSY": 3}) == "3 of 200 requests lost or refused"
+    assert broken(devices=5) == "4 of 5 devices joined"
+
+
+def test_messages_are_counted_in_a_second_and_what_is_elsewhere_is_not_known():
+    counts = vars(LoadCounts(trips={"list": [0.01] * 60}, published=40))
+    found = figures_of(LoadOptions(duration=10.0), 0, [counts, counts], NOT_HERE)
+    assert found.messages_per_s == 20.0
+    assert found.requests_p50_s == 0.01
+    assert math.isnan(found.orders_p50_s)
+    assert math.isnan(found.memory_mb)
+
+
+@pytest.mark.system
+def test_a_small_load_is_answered_by_a_dva_that_is_started_for_it(tmp_path):
+    words = "--devices 12 --sessions 2 --reports 60 --churn 60 --for 3".split()
+    done = call("load", *words, "-o", tmp_path / "load.csv")
+    assert done.returncode == 0, done.stderr
+    assert "12 of 12 devices, 2 sessions:" in done.stdout
+    assert "open files" in done.stdout
+    with (tmp_path / "load.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["messages_per_s"]) > 20
+    assert 0 < float(row["orders_p50_s"]) < 30
+    assert float(row["files"]) > 50
+    assert (row["lost"], row["refused"], row["broke"]) == ("0", "0", "")
