@@ -16,7 +16,19 @@ from typing import Any
 MARKUP = "<script>alert(1)</script>"
 FORMULA = '=HYPERLINK("http://example.org")'
 TURNED = "\u202eegnellahc"  # shown from right to left
-TEXTS = (MARKUP, FORMULA, TURNED, "", " ", "a" * 5000, "../../x", "\x1b[31m", "a\nb", "nan", "1e400")
+TEXTS = (
+    MARKUP,
+    FORMULA,
+    TURNED,
+    "",
+    " ",
+    "a" * 5000,
+    "../../x",
+    "\x1b[31m",
+    "a\nb",
+    "nan",
+    "1e400",
+)
 NUMBERS = (
     *(0, -0.0, -1, 1e-320, 1e19, 1e300, -1e300, 2**31, 2**63, -(2**63), 2**64, 10**400),
     *(math.inf, -math.inf, math.nan),

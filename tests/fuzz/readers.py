@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import partial
+from io import StringIO
 from pathlib import Path
-from typing import Any
 
 from fuzz import mutations as m
 from helpers.paths import ROOT, TESTS
@@ -56,7 +57,8 @@ def made(name: str, words: str, folder: Path) -> list[Path]:
 
     file = folder / "made" / name
     file.parent.mkdir(parents=True)
-    code = call(words.format(file).split())
+    with redirect_stdout(StringIO()):
+        code = call(words.format(file).split())
     assert not code, (words, code)
     return [file]
 
@@ -109,8 +111,10 @@ DELAYS = {
     "delays.csv": a_log("time_s,delay_ms", lambda n: f"{n / 10},{20 + n % 7}"),
     "ping.log": a_log(
         "PING 10.0.0.1 (10.0.0.1) 56(84) bytes of data.",
-        lambda n: f"[{1700000000 + n}.5] 64 bytes from 10.0.0.1: icmp_seq={n + 1} ttl=64 "
-        f"time={20 + n % 7}.0 ms",
+        lambda n: (
+            f"[{1700000000 + n}.5] 64 bytes from 10.0.0.1: icmp_seq={n + 1} ttl=64 "
+            f"time={20 + n % 7}.0 ms"
+        ),
     ),
 }
 SMALL_SCENARIO = {"small.yaml": "description: one robot\nhorizon_s: 20\nevents: []\n"}
@@ -228,7 +232,9 @@ def readers() -> list[Reader]:
         Reader("table", partial(results, "tables/runs.parquet"), m.of_parquet, table[1:], weight=6),
         Reader("manifest", partial(results, "manifest.json"), m.of_json, table[1:], weight=10),
         Reader("journal", partial(results, "journal.sqlite"), m.of_sqlite, table[1:2], weight=6),
-        Reader("registration", partial(copies, "experiments/*.registration.yaml"), m.of_yaml, check),
+        Reader(
+            "registration", partial(copies, "experiments/*.registration.yaml"), m.of_yaml, check
+        ),
         Reader("audit log", audit, m.of_sqlite, check),
         Reader("users", users, m.of_json, ("users list --file {}",)),
         Reader("state", state, m.of_sqlite, read=read_state, refuses=(DvaSimError,)),

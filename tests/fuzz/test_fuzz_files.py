@@ -1,0 +1,86 @@
+"""A thousand fixed mutants of files and messages, and proof that the search finds what is wrong."""
+
+from functools import partial
+from random import Random
+
+import pytest
+from fuzz import fuzz_files, mutations
+from fuzz.readers import Reader, readers, texts
+
+COUNTS = {"quick": 900, "slow": 100}  # of readers of bytes and text, and of those that simulate
+SLOW = {
+    *("study", "scenario", "site", "plan", "map"),
+    *("recording", "table", "manifest", "journal"),
+}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", COUNTS)
+def test_mutants_end_in_a_line_of_ours_within_their_limits(kind):
+    table = [reader for reader in readers() if (reader.name in SLOW) == (kind == "slow")]
+    assert fuzz_files.search(table, COUNTS[kind], seed=1) == {}
+
+
+def test_every_slow_reader_is_one_of_the_table():
+    assert {reader.name for reader in readers()} > SLOW
+
+
+def faulty(read, **options):
+    return Reader("faulty", partial(texts, {"a.json": "{}"}), mutations.raw, read=read, **options)
+
+
+def crash(data):
+    raise IndexError("planted")
+
+
+def loop(data):
+    while True:
+        pass
+
+
+def swell(data):
+    bytearray(600_000_000)
+
+
+def turn(data):
+    raise ValueError("name \u202eegnellahc")
+
+
+@pytest.mark.parametrize(
+    ("read", "names"),
+    [(crash, "IndexError: planted"), (swell, " MB"), (turn, "control characters")],
+)
+def test_the_search_finds_a_planted_fault(read, names):
+    faults = fuzz_files.search([faulty(read, refuses=(ValueError,))], 1, seed=1)
+    assert names in faults["faulty"][0]
+
+
+def test_the_search_ends_a_reader_that_hangs(monkeypatch):
+    monkeypatch.setattr(fuzz_files, "MOST_CPU_S", 1)
+    faults = fuzz_files.search([faulty(loop)], 1, seed=1)
+    assert "takes more than 1 s of processor" in faults["faulty"][0]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("report.html", f"<p>{mutations.MARKUP}</p>", "active markup"),
+        ("report.html", "<p>&lt;script&gt;</p>", ""),
+        ("report.html", f"<p>{mutations.TURNED}</p>", "control characters"),
+        ("x.csv", f'a,"{mutations.FORMULA}"\n', "a formula"),
+        ("x.csv", f"a,'{mutations.FORMULA}\n", ""),
+    ],
+)
+def test_what_is_active_in_a_file_is_seen(tmp_path, name, content, problem):
+    path = tmp_path / name
+    path.write_text(content)
+    found = fuzz_files._active_in(path)
+    assert bool(found) == bool(problem)
+    assert problem in found
+
+
+def test_the_same_seed_gives_the_same_mutants():
+    data = b'{"a": [1, 2, {"b": 0.5}], "c": "x"}'
+    first, again = ([mutations.of_json(data, Random(n)) for n in range(50)] for _ in range(2))
+    assert first == again
+    assert len(set(first)) > 30
