@@ -19,6 +19,21 @@ _BLANK: Final = frozenset(
 )
 
 
+HIDDEN = {
+    code: chr(code).encode("unicode_escape").decode()
+    for code in (
+        *range(9),
+        11,
+        12,
+        *range(14, 32),
+        127,
+        *range(0x202A, 0x202F),
+        *range(0x2066, 0x206A),
+    )
+}
+"""Escapes of the characters that control a terminal or turn the direction of text, for pages."""
+
+
 def visible(text: str) -> str:
     r"""Return the text with an escape, such as `\u202e`, for each character that is invisible.
 

@@ -1,12 +1,14 @@
 """Mistakes in studies and settings, and results folders that cannot be read or compared."""
 
+import json
 import sqlite3
-from functools import partial
-from operator import call
+from functools import partial, reduce
+from operator import call, getitem
 from pathlib import Path
 from typing import Any
 
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
+from helpers.paths import TESTS
 from helpers.studies import small_study as kit
 from helpers.studies.small_study import COMPARED, FULL, PREDICTED, REPEATED, STUDY, TREATED
 
@@ -474,6 +476,13 @@ def manifest(text):
     Results.load(Path())
 
 
+def changed_manifest(path, value):
+    data = json.loads((TESTS / "data/results-0.7.0/manifest.json").read_text())
+    *above, last = path
+    reduce(getitem, above, data)[last] = value
+    manifest(json.dumps(data))
+
+
 def journal_of_an_older_version():
     with sqlite3.connect(JOURNAL) as db:
         db.execute("CREATE TABLE study (id INTEGER, identity TEXT, wall_s REAL)")
@@ -540,6 +549,17 @@ def damaged_journal():
 FOLDERS = [
     *mistakes(Results.load, (Path(), "finished results"), (Path("nowhere"), "nowhere folder")),
     *mistakes(manifest, ('{"name": "a web page"}', "manifest")),
+    *mistakes(manifest, ("[" * 9000, "manifest")),
+    *mistakes(
+        changed_manifest,
+        (("study", "persons"), 1e400, "manifest.json: study.persons"),
+        (("study", "answer", "contrast"), 5, "manifest.json: study.answer.contrast"),
+        (("study", "factors", "pattern"), [], "manifest.json: study.factors.pattern"),
+        (("cells", 0, "levels"), None, "manifest.json: cells.0.levels"),
+        (("scenarios", "drive", "link", "delay_s"), [], "manifest.json: delay_s"),
+        (("scenarios", "drive", "model"), "full.py", "manifest.json: scenarios.drive.model"),
+        (("failures",), {}, "manifest.json: failures"),
+    ),
     *mistakes(of_file(lambda _: Results.load(Path()), JOURNAL), ("", "finished")),
     *mistakes(of_file(lambda _: Checkpoint(Path(), "me"), JOURNAL), ("a diary" * 100, "journal")),
     *mistakes(

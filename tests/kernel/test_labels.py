@@ -2,7 +2,7 @@
 
 import pytest
 
-from dva_sim.kernel.labels import LONGEST, distinct, look_of, visible, with_id
+from dva_sim.kernel.labels import HIDDEN, LONGEST, distinct, look_of, visible, with_id
 
 ID = "02:00:00:09:00:09"
 
@@ -41,3 +41,7 @@ def test_it_fits_into_a_message(long):
     assert len(distinct(long, ID, [])) <= LONGEST
     assert with_id(long, ID).endswith(f" ({ID})")
     assert len(with_id(long, ID)) <= LONGEST
+
+
+def test_a_page_shows_escapes_of_what_turns_text_or_controls_a_terminal_and_keeps_its_lines():
+    assert "a\u202eb\x1b[31m\n\u00a0\u2013".translate(HIDDEN) == "a\\u202eb\\x1b[31m\n\u00a0\u2013"

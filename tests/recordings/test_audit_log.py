@@ -96,6 +96,11 @@ PLANTED: dict[str, tuple[tuple[str, ...], int, str]] = {
     "the end cut": (("DELETE FROM audit WHERE number>3",), 4, "the end was cut"),
     "all removed": (("DELETE FROM audit",), 1, "the end was cut"),
     "another format": (("UPDATE about SET value='9' WHERE name='format'",), 1, "of format 1"),
+    "a last number that is none": (
+        ("UPDATE sqlite_sequence SET seq='many' WHERE name='audit'",),
+        1,
+        "is not an audit log",
+    ),
     "no table": (("DROP TABLE audit",), 1, "is not an audit log"),
 }
 

@@ -56,6 +56,7 @@ from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.kernel.labels import HIDDEN
 from dva_sim.kernel.whole_files import whole, write_whole
 from dva_sim.kernel.wording import capital, first_and_rest, listing, number
 from dva_sim.simulation.labels import factor_name, is_in_file, level_name, setting, with_unit
@@ -395,7 +396,8 @@ def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
 def _page(question: str, blocks: Sequence[Block]) -> str:
     """Fill the template."""
     sections = [block.text for block in blocks if isinstance(block, Heading) and block.level == 2]
-    return _template().render(question=question, blocks=blocks, sections=sections)
+    page = _template().render(question=question, blocks=blocks, sections=sections)
+    return page.translate(HIDDEN)  # else a name might turn the text around it
 
 
 def _template() -> jinja2.Template:

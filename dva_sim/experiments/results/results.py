@@ -18,7 +18,7 @@ from html import escape
 from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,6 +256,30 @@ class _Cell(Config):
     levels: dict[str, Level]
 
 
+class _LinkNumbers(Config):
+    """Numbers of a link that reports calculate with."""
+
+    model_config = ConfigDict(extra="allow")
+
+    delay_s: float | None = None
+    jitter_s: float | None = None
+    rate_bps: float | None = None
+    up: _LinkNumbers | None = None
+    down: _LinkNumbers | None = None
+
+
+class _Played(Config):
+    """Scenario of a manifest, as far as reports calculate with it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    model: Literal[tuple(MODELS)] = "full"  # type: ignore[valid-type]
+    horizon_s: float | None = None
+    link: _LinkNumbers | None = None
+    robot: dict[str, Any] = Field(default_factory=dict)
+    command: dict[str, Scalar] = Field(default_factory=dict)
+
+
 class _Manifest(Config):
     """Form of a manifest, as far as it is read; the study's is that of its file."""
 
@@ -264,7 +288,7 @@ class _Manifest(Config):
     study: Study
     question: str = ""
     status: Status | None = None
-    scenarios: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    scenarios: dict[str, _Played] = Field(default_factory=dict)
     set: list[str | tuple[str, Any]] = Field(default_factory=list)
     changes: dict[str, Any] = Field(default_factory=dict)
     cells: list[_Cell] = Field(default_factory=list)

@@ -5,9 +5,7 @@ from helpers.wording import unnamed
 from dva_sim.experiments.report.method import remarks
 
 PERSONS = 4
-STOP = {
-    "stop": {"comparison": "answer", "half_width": 1.0, "batch_persons": 1, "most_persons": 6}
-}
+STOP = {"stop": {"comparison": "answer", "half_width": 1.0, "batch_persons": 1, "most_persons": 6}}
 
 
 def reading(tmp_path, study=None, **facts):
