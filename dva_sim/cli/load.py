@@ -73,6 +73,7 @@ def lines(figures: LoadFigures) -> list[str]:
             f"  DVA: {figures.memory_mb:.0f} MB, {figures.files:.0f} open files, "
             f"{100 * figures.processor:.0f} % of a core"
         )
+    texts.append(f"  load: late by at most {1000 * figures.late_s:.0f} ms")
     return [*texts, *([f"  broken: {figures.broke}"] if figures.broke else [])]
 
 

@@ -50,7 +50,8 @@ class LoadFigures:
         memory_mb: Memory of the DVA [MB]; nan if it is not here.
         files: Open files of the DVA; nan if it is not here.
         processor: Share of one core that the DVA used; nan if it is not here.
-        broke: Reason why the DVA counts as broken; empty while it does not.
+        late_s: Longest time that the processes of the load were late themselves [s].
+        broke: Reason why the DVA counts as broken, or nothing is known of it; empty while it holds.
     """
 
     devices: int
@@ -74,6 +75,7 @@ class LoadFigures:
     memory_mb: float
     files: float
     processor: float
+    late_s: float
     broke: str = ""
 
 
@@ -127,9 +129,11 @@ def figures_of(
     requests = percentiles("requests", of_dva)
     missed = refused.total() + lost.total()
     joined = sum(counts["joined"] for counts in every)
+    late = max(counts["late"] for counts in every)
     slowest = requests["requests_p99_s"]
     asked = answered + lost.total()
     signs = {
+        f"the load itself was late by {late:.2f} s, so take more processes": late > MOST_LATE_S / 2,
         f"p99 of replies {slowest:.2f} s": slowest > MOST_LATE_S,
         f"{missed} of {asked} requests lost or refused": missed > MOST_LOST * asked,
         f"{joined} of {devices} devices joined": joined < (1 - MOST_LOST) * devices,
@@ -146,6 +150,7 @@ def figures_of(
         refused=refused.total(),
         lost=lost.total(),
         **dva,
+        late_s=late,
         broke="; ".join(sign for sign, is_there in signs.items() if is_there),
     )
 

@@ -79,6 +79,7 @@ class LoadCounts:
         reported: Place of each event that was reported, and when, by the machine's clock [s].
         ordered: Place of each event that somebody was sent to, and when, by the same.
         joined: Number of devices that are registered at the end.
+        late: Longest time that something waited for this process [s].
     """
 
     trips: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -88,6 +89,7 @@ class LoadCounts:
     reported: list[tuple[str, float]] = field(default_factory=list)
     ordered: list[tuple[str, float]] = field(default_factory=list)
     joined: int = 0
+    late: float = 0.0
 
 
 def place_of(position: m.Position) -> str:
@@ -107,7 +109,6 @@ class LoadDevices:
         self._network = network
         self._share = share
         self._rng = Random(f"{share.seed}/{share.number}")
-        self._begins = 0.0
         self._joined: set[str] = set()
         self._commanded: set[str] = set()
         self._vanished: deque[AgentDevice] = deque()
@@ -139,6 +140,7 @@ class LoadDevices:
     def finish(self) -> LoadCounts:
         """Return the counts."""
         self.counts.joined = len(self._joined)
+        self.counts.late = self._network.clock.lateness
         return self.counts
 
     def _device(self, kind: str, number: int) -> AgentDevice:
@@ -158,8 +160,8 @@ class LoadDevices:
         )
 
     def _measure(self) -> None:
-        self._begins = self._network.clock.now
         self.counts = LoadCounts()
+        self._network.clock.lateness = 0.0
 
     def _join(self, device: AgentDevice) -> None:
         device.register(partial(self._joined.add, device.id_tag))

@@ -31,6 +31,8 @@ def test_a_dva_counts_as_broken_by_late_replies_lost_requests_or_missing_devices
     assert broken(lost={"report": 2}) == ""
     assert broken(lost={"report": 3}) == "3 of 203 requests lost or refused"
     assert broken(refused={"report: BUSY": 3}) == "3 of 200 requests lost or refused"
+    itself = "the load itself was late by 0.60 s, so take more processes"
+    assert broken(late=0.6) == itself
     assert broken(devices=5) == "4 of 5 devices joined"
 
 
@@ -45,7 +47,7 @@ def test_messages_are_counted_in_a_second_and_what_is_elsewhere_is_not_known():
 
 @pytest.mark.system
 def test_a_small_load_is_answered_by_a_dva_that_is_started_for_it(tmp_path):
-    words = "--devices 12 --sessions 2 --reports 60 --churn 60 --for 3".split()
+    words = ["--devices", "12", "--sessions", "2", "--reports", "60", "--churn", "60", "--for", "3"]
     done = call("load", *words, "-o", tmp_path / "load.csv")
     assert done.returncode == 0, done.stderr
     assert "12 of 12 devices, 2 sessions:" in done.stdout
