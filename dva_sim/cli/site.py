@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.labels import visible
 from dva_sim.options.forms import OptionForm, argument, out_form
 
 if TYPE_CHECKING:
@@ -95,4 +96,4 @@ def describe(site: Site) -> str:
         "wall segments": len(site.walls),
     }
     text = ", ".join(f"{number} {what}" for what, number in parts.items() if number)
-    return f"{site.name}: {xmax - xmin:.1f} m x {ymax - ymin:.1f} m, {text}"
+    return f"{visible(site.name)}: {xmax - xmin:.1f} m x {ymax - ymin:.1f} m, {text}"

@@ -102,7 +102,7 @@ class LoadDevices:
 
     Args:
         network: Their sockets.
-        share: What they do.
+        share: Share of the load that they make.
     """
 
     def __init__(self, network: SocketNetwork, share: LoadShare) -> None:

@@ -325,7 +325,7 @@ def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64
 
 
 def _check_size(size: tuple[int, int], document: Document, config: RosMap) -> None:
-    """Refuse an image whose map would take gigabytes, or that is no building's."""
+    """Refuse an image whose map would take gigabytes, or is larger than a building's."""
     columns, rows = size
     if columns * rows > MOST_CELLS:
         problem = (

@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+from contextlib import closing
 from functools import partial, reduce
 from operator import call, getitem
 from pathlib import Path
@@ -483,6 +484,13 @@ def changed_manifest(path, value):
     manifest(json.dumps(data))
 
 
+def changed_journal(statement):
+    Path(JOURNAL).write_bytes((TESTS / "data/results-0.7.0" / JOURNAL).read_bytes())
+    with closing(sqlite3.connect(JOURNAL, isolation_level=None)) as db:
+        db.execute(statement)
+    load_so_far(Path())
+
+
 def journal_of_an_older_version():
     with sqlite3.connect(JOURNAL) as db:
         db.execute("CREATE TABLE study (id INTEGER, identity TEXT, wall_s REAL)")
@@ -570,6 +578,19 @@ FOLDERS = [
         (no_runs, "'runs'; tracks"),
         (damaged_journal, "damaged move"),
         (lambda: dry_run(kit.study_in(Path(), "seed=4"), Path("out")), "out another study"),
+    ),
+    *mistakes(
+        changed_journal,
+        ("UPDATE study SET manifest = '{'", "journal.sqlite: damaged"),
+        (
+            "UPDATE study SET manifest = json_set(manifest, '$.study.answer', 'x')",
+            "journal.sqlite: study.answer",
+        ),
+        ("UPDATE runs SET tables = substr(tables, 1, 99)", "journal.sqlite: damaged"),
+        (
+            """UPDATE runs SET tables = '{"runs": [{"x": {}}, {"x": 1.0}]}'""",
+            "'runs' run",
+        ),
     ),
     *mistakes(partial(of_empty_file, load_so_far), ("file", "folder")),
     *mistakes(partial(of_empty_file, FolderLock), ("file", "file"), ("file/below", "file")),

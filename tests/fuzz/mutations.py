@@ -51,7 +51,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 def a_value(rng: Random, old: Any) -> Any:
     """Draw a value that nobody would write; often one near the old."""
-    near = [old * 1e6, -old, old / 1e6, old + 1] if type(old) in (int, float) else [old, [old]]
+    near = [old * 10**6, -old, old // 7, old + 1] if type(old) in (int, float) else [old, [old]]
     return rng.choice(rng.choice([TEXTS, NUMBERS, NUMBERS, OTHERS, near]))
 
 

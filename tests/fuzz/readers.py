@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from random import Random
 
 from fuzz import mutations as m
 from helpers.paths import ROOT, TESTS
@@ -27,7 +28,7 @@ class Reader:
         mutate: Damage that knows the form.
         uses: Words of commands in which `{}` is the file and `{folder}` its folder, each followed
             only while the one before says that the file is valid.
-        read: Function of bytes, for what comes over a wire; then there are no uses.
+        read: Function of bytes, for what comes over a wire; its files have no uses.
         refuses: Errors by which that function refuses.
         weight: Share of all mutants.
     """
@@ -125,6 +126,25 @@ LINES = {
 }
 
 
+PLUG_IN = """\
+import os, sys, time
+class Mine:
+    def advise(self, situation, rng):
+        {}
+"""
+ACTS = (
+    *("raise ValueError('no')", "time.sleep(0.01)", "print('x' * 5000)", "sys.exit(3)"),
+    *("return None", "return [1, 2]", "return {'a': float('nan')}", "raise KeyboardInterrupt"),
+    *("return self", "situation.events = 5", "os.chdir('/')", "raise BaseException('no')"),
+    *("return 10**400", "raise RecursionError", "return unknown", "yield 5"),
+)
+
+
+def plug_in(data: bytes, rng: Random) -> bytes:
+    """Write a policy that acts as no policy does."""
+    return PLUG_IN.format(rng.choice(ACTS)).encode()
+
+
 def users(folder: Path) -> list[Path]:
     from dva_sim.serving.users import UserFile
 
@@ -212,7 +232,9 @@ def readers() -> list[Reader]:
     campus = partial(beside, "worlds/campus.yaml", "worlds/*.geojson")
     plan = partial(beside, "worlds/caparica.geojson", "worlds/caparica.yaml")
     record = partial(made, "run.mcap", "episode drive-to-event --record {}")
+    policies = partial(texts, {"mine.py": PLUG_IN})
     return [
+        Reader("plug-in", policies, plug_in, ("check policy {}:Mine",), weight=2),
         Reader("message", partial(copies, "protocol/samples/valid/*.xml"), m.raw, check, weight=30),
         Reader("study", partial(copies, "experiments/k*.yaml"), m.of_yaml, check, weight=4),
         Reader(

@@ -1,9 +1,11 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
+from dva_sim.cli.site import describe
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
@@ -134,3 +136,8 @@ def test_samples_have_their_clearance_in_rooms_behind_doors_narrower_than_it(tmp
         assert site.is_free(x, y, 0.5)
     with pytest.raises(ConfigError, match="3 m radius"):
         site.sample_free(rng, 3.0)
+
+
+def test_a_name_that_controls_a_terminal_is_shown_with_escapes():
+    site = replace(load_site("caparica"), name="\x1b[31m")
+    assert describe(site).startswith("\\x1b[31m: 40.0 m")

@@ -142,9 +142,9 @@ def _site(scenario: Mapping[str, Any]) -> str:
 def _text(key: str, value: Any) -> str:
     if value is None:
         return "–"
-    if key.endswith(".rate_bps"):
+    if isinstance(value, int | float) and key.endswith(".rate_bps"):
         return f"{value / 1e6:g} Mbit/s"
-    if key.endswith(("_bytes", ".bytes")):
+    if isinstance(value, int | float) and key.endswith(("_bytes", ".bytes")):
         return f"{value / 1000:g} kB"
     if isinstance(value, Mapping):
         return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NOWHERE

@@ -20,7 +20,14 @@ from typing import Any
 
 from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.results.manifest import failures
-from dva_sim.experiments.results.results import JOURNAL, MANIFEST, TABLES, Results, digests
+from dva_sim.experiments.results.results import (
+    JOURNAL,
+    MANIFEST,
+    TABLES,
+    Results,
+    checked_manifest,
+    digests,
+)
 from dva_sim.experiments.results.tables import TablesOf, write_tables
 from dva_sim.experiments.study.cell_grid import RunKey, StudyRun, runs_in
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -183,7 +190,8 @@ class Checkpoint:
         if "manifest" not in {row[1] for row in self._ask("PRAGMA table_info(study)")}:
             return None
         ((text,),) = self._ask("SELECT manifest FROM study")
-        return None if text is None else dict(json.loads(text))
+        with self._readable_errors():
+            return None if text is None else checked_manifest(json.loads(text), self.path)
 
     def done(self) -> set[RunKey]:
         """Return keys of the runs that need not be run again."""
@@ -197,7 +205,8 @@ class Checkpoint:
     def tables(self, key: RunKey) -> Tables | None:
         """Return the tables of a run; None if it is not done."""
         query = "SELECT tables FROM runs WHERE config = ? AND seed = ?"
-        return next((json.loads(text) for (text,) in self._ask(query, key) if text), None)
+        with self._readable_errors():
+            return next((json.loads(text) for (text,) in self._ask(query, key) if text), None)
 
     def costs(self) -> dict[RunKey, float]:
         """Return the cost of each completed run [CPU s]."""
@@ -220,7 +229,7 @@ class Checkpoint:
             yield
         except sqlite3.OperationalError as error:
             raise DvaSimError(f"{self.path}: {_remedy(str(error))}") from None
-        except (sqlite3.DatabaseError, TypeError) as error:
+        except (sqlite3.DatabaseError, TypeError, ValueError, RecursionError) as error:
             raise ConfigError(
                 f"is not the journal of a study, or damaged ({error}); move it away to start over",
                 self.path,

@@ -300,6 +300,18 @@ class _Manifest(Config):
     columns: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
 
 
+def checked_manifest(manifest: Any, file: Path) -> dict[str, Any]:
+    """Return what was read as a manifest, if it has the form of one.
+
+    Raises:
+        ConfigError: it has not.
+    """
+    if not isinstance(manifest, dict) or "study" not in manifest:
+        raise ConfigError("is not the manifest of a study", file)
+    validate(_Manifest, manifest, lambda text, _: ConfigError(f"is damaged: {text}", file))
+    return manifest
+
+
 @dataclass(frozen=True)
 class Results:
     """Results of a study.
@@ -334,10 +346,7 @@ class Results:
             raise ConfigError(_not_results(Path(folder))) from None
         except (OSError, ValueError, RecursionError) as error:
             raise ConfigError(f"cannot be read as a manifest: {error}", path) from None
-        if not isinstance(manifest, dict) or "study" not in manifest:
-            raise ConfigError("is not the manifest of a study", path)
-        validate(_Manifest, manifest, lambda text, _: ConfigError(f"is damaged: {text}", path))
-        return cls(Path(folder), manifest)
+        return cls(Path(folder), checked_manifest(manifest, path))
 
     @property
     def study(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dva_sim.experiments.results.results import TABLES, quoted
 from dva_sim.experiments.study.cell_grid import RunKey, StudyRun
 from dva_sim.experiments.study.parts import REPEATS
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.simulation.models import Tables
 
 _BATCH_ROWS = 20_000
@@ -185,7 +185,11 @@ class _Table:
             self._kinds = kinds
         self._fits = self._fits and kinds == self._kinds
         if self._fits and batch:
-            arrays = {column: _array(values[column], kind) for column, kind in kinds.items()}
+            try:
+                arrays = {column: _array(values[column], kind) for column, kind in kinds.items()}
+            except (TypeError, ValueError, OverflowError) as error:
+                problem = f"table {self._name!r} cannot hold what a run has: {error}"
+                raise ConfigError(problem) from None
             self._database.register("batch", arrays)
             self._database.execute("INSERT INTO rows SELECT * FROM batch")
             self._database.unregister("batch")

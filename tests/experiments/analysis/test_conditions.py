@@ -98,3 +98,8 @@ def test_what_is_special_about_a_link_is_told_and_no_more():
     found = special(bursts={"mean_s": 0.1}, outages=[{"from_s": 3, "for_s": 2}], **ways)
     outage = "from_s 3.0, for_s 2.0, direction both"
     assert found == ["50", outage, "loss 0.2", "mean_s 0.1, loss 1.0", "yes"]
+
+
+def test_a_size_that_is_no_number_is_told_as_it_stands():
+    rows = dict(conditions({"drive": {"camera": {"frame_bytes": "many"}}}, []))
+    assert ["many"] in rows.values()
