@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from dva_sim.cli.options import Json, Quiet
+from dva_sim.cli.verbosity import print_json
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.whole_files import write_whole
 from dva_sim.options.runs import LoadOptions
 
 if TYPE_CHECKING:
@@ -31,9 +33,7 @@ def load(options: LoadOptions, quiet: Quiet = False, as_json: Json = False) -> N
         dva-sim load --dva 192.168.1.10:5600 --host 192.168.1.20  # a DVA elsewhere
         dva-sim load --until-it-breaks --for 20 -o load.csv  # twice as many each time
     """
-    from dva_sim.cli.verbosity import print_json  # late: start-up
     from dva_sim.kernel.resources import refuse_to_replace  # late: start-up
-    from dva_sim.kernel.whole_files import write_whole  # late: start-up
     from dva_sim.live.load import run_load  # late: start-up
 
     out = options.out

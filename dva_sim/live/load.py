@@ -19,9 +19,10 @@ from typing import Any, Final
 import numpy as np
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.load_devices import LoadShare
+from dva_sim.live.load_devices import LONGEST, LoadShare
+from dva_sim.live.supervisor import free_pairs
 from dva_sim.network.addresses import check_address
-from dva_sim.options.runs import LoadOptions
+from dva_sim.options.runs import LiveOptions, LoadOptions
 from dva_sim.serving.processes import Child, end_all
 
 SCENARIO: Final = "drive-to-event"  # whose site the DVA that is started knows
@@ -236,27 +237,18 @@ def _dva(options: LoadOptions) -> Iterator[tuple[str, LoadedDva]]:
     if options.dva is not None:
         yield options.dva, LoadedDva(options.pid)
         return
-    address = f"{options.host}:{_free_port(options.host)}"
-    words = ["live", SCENARIO, "--only", "dva", "--no-page", "--dva", address]
-    command = [sys.executable, "-m", "dva_sim.cli", *words]
-    child = Child("the DVA", command, stdout=subprocess.DEVNULL)
+    (port,) = free_pairs(1)
+    address = f"{options.host}:{port}"
+    run = LiveOptions(SCENARIO, only="dva", no_page=True, dva=address, duration=LONGEST)
+    part = {"part": "dva", "number": 1, "epoch": None, "outlet": None, "door": ()}
+    about = json.dumps(part | {"options": vars(run)})
+    command = [sys.executable, "-m", "dva_sim.live", about]
+    child = Child("the DVA", command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
     try:
         child.ready(lambda: _listens(address))
         yield address, LoadedDva(child.pid)
     finally:
         end_all([child])
-
-
-def _free_port(host: str) -> int:
-    """Find the first of two ports that are free now."""
-    while True:
-        with socket.create_server((host, 0)) as one:
-            port: int = one.getsockname()[1]
-            try:
-                socket.create_server((host, port + 1)).close()
-            except OSError:
-                continue
-            return port
 
 
 def _listens(address: str) -> bool | None:

@@ -24,6 +24,7 @@ from dva_sim.live.process import ending_when_asked
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.simulation.full.stage import DVA, TYPES, id_of, label_of
 from dva_sim.worlds.site import DEFAULT_FRAME
 
@@ -31,7 +32,7 @@ GUARDS: Final = 0.2  # design: share of the devices that are not in a session
 TIMEOUT: Final = 2.0  # design: a request without a reply for so long is lost [s]
 PLACES: Final = tuple((2.0 + 4.0 * n, 12.0) for n in range(10))  # design: in a corridor [m]
 APART: Final = 4096  # design: numbers of devices between two processes
-LONGEST: Final = 3600.0  # design: an orphan ends by then [s]
+LONGEST: Final = 36_000.0  # design: an orphan ends by then [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +166,7 @@ class LoadDevices:
 
     def _join(self, device: AgentDevice) -> None:
         device.register(partial(self._joined.add, device.id_tag))
-        if device in self._robots or device in self._guards:
+        if device.device_type in (ROBOT, GUARD):
             self._network.clock.every(1 / self._share.status_hz, partial(self._status, device))
 
     def _status(self, device: AgentDevice) -> None:
@@ -174,7 +175,8 @@ class LoadDevices:
         now = self._network.clock.now
         at = self._somewhere()
         robot = m.RobotStatus("Idle", at, 0.0, 0.0, 0.0, int(1000 * now))
-        device.publish(STATUS, robot if device in self._robots else m.PersonStatus("waiting", at))
+        is_robot = device.device_type == ROBOT
+        device.publish(STATUS, robot if is_robot else m.PersonStatus("waiting", at))
         self.counts.published += 1
 
     def _somewhere(self) -> m.Position:

@@ -43,7 +43,6 @@ LISTENERS = {
     "serving/listening.py": {"console", "phones", "rosbridge", "foxglove", "cameras"},
     "serving/open_port.py": {"rosbridge", "foxglove"},
     "cli/link.py": "--publish, on loopback: passes bytes on to a program of the user",
-    "live/load.py": "tries whether two ports are free, and closes them",
     "live/supervisor.py": "tries whether ports are free, and closes them",
     "console/remote/beside.py": "tries whether a port is free, and closes it",
     "console/pages/processes.py": "tries whether a port is free, and closes it",
