@@ -283,4 +283,4 @@ class CommandSender:
     def lost(self, why: str = "") -> None:
         """Alert, as nobody obeys any more, and end the drive."""
         self.drive.alerts += 1
-        self._on_lost(why or "no answer and no picture")
+        self._on_lost(why or f"no answer after {self.attempts} attempts")

@@ -29,6 +29,7 @@ MOST_INPUTS = 4096  # design: that are remembered until they act
 GRANT_WITHIN = 5.0  # design: the DVA's grant may be on its way to the robot for so long [s]
 MOST_PICTURES = 1024  # design: whose ticks are remembered until they are drawn
 LOST_AFTER = 9.0  # design: without a word of the robot: three times its watchdog [s]
+ENOUGH = 3  # design: status messages in a row, which may be older than the start of a drive
 
 
 class HeldRobot:
@@ -82,7 +83,7 @@ class HeldRobot:
         self._starting: OnResult | None = None
         self.log: DriveLog | None = None
         self.frame: CameraFrame | None = None
-        self.arrived = 0.0
+        self.arrived = -math.inf
         self.drawn: float | None = None
         self._drawn_tick: int | None = None
         self._ticks: dict[int, int] = {}  # of the newest pictures, by when they were taken [ms]
@@ -98,6 +99,7 @@ class HeldRobot:
         # of the newest status [s], [ms]
         self._heard = -math.inf
         self._tick = -math.inf
+        self._idle = 0  # status messages in a row that deny the drive
         self.on_frame: Callable[[HeldRobot, CameraFrame], object] = lambda *_: None
 
     @property
@@ -214,6 +216,15 @@ class HeldRobot:
         if message is not None and isinstance(message.body, m.RobotStatus):
             self._heard = self.device.clock.now
             self._tick = message.body.tick
+            denies = self.phase == "driving" and message.body.mode != "Teleoperation"
+            self._idle = self._idle + 1 if denies else 0
+            if self._idle == ENOUGH:
+                self._refused("the robot has ended the drive: it obeys again after a start")
+
+    @property
+    def heard_at(self) -> float:
+        """Time of the newest picture or status of the robot [s]; -inf: none has come."""
+        return max(self.arrived, self._heard)
 
     def drew(self, captured_ms: int | None) -> None:
         """Note which picture of the robot the person's page has drawn last.
@@ -415,7 +426,7 @@ class HeldRobot:
     def _listen(self, log: DriveLog) -> bool:
         """Lose the link after too long without picture or status; return True in a drive."""
         goes_on = self.log is log and self.phase == "driving"
-        silent = self.device.clock.now - max(self.arrived, self._heard, log.started or 0.0)
+        silent = self.device.clock.now - max(self.heard_at, log.started or 0.0)
         if goes_on and silent > self._lost_after:
             self._lost(f"nothing was heard for {silent:.0f} s")
         return goes_on

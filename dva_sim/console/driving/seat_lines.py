@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -135,6 +136,7 @@ class SeatLines:
         reach = system.reach(held.robot)
         acted = self._acted.get(held.robot, _NOTHING)
         frame = held.frame
+        silent = system.clock.now - held.heard_at
         trips = log.round_trips
         is_over = log.ended is not None
         command = log.commands[-1][1:] if log.commands and not is_over else (0.0, 0.0)
@@ -152,6 +154,7 @@ class SeatLines:
             "command_age_ms": acted.age_ms,
             "picture_ms": None if frame is None else round(1000 * frame.captured),
             "picture_arrived_ms": None if frame is None else round(1000 * held.arrived),
+            "silent_s": round(silent) if silent < math.inf else None,
             "loop_ms": acted.loop_ms,
             "input": acted.input,
             "sent": log.sent,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -11,7 +11,8 @@ from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
 from dva_sim.console.wire.arguments import CalibrationAsked, SampleBatch
 from dva_sim.kernel.errors import ConfigError
 
-PIPELINES: Final = ("default", "dissertation")
+PIPELINES: Final[Mapping[str, str | None]] = {"default": None, "dissertation": "req-rep"}
+"""Pattern of each pipeline's app; None: that of the robot."""
 FLAT: Final[Triple] = (0.0, 0.0, GRAVITY)  # what a phone that lies flat measures
 
 
@@ -49,7 +50,7 @@ class PhoneSettings:
 
     reference: Triple = FLAT
     changes: dict[str, Any] = field(default_factory=dict)
-    pipeline: str = PIPELINES[0]
+    pipeline: str = "default"
     filter: str | None = None
     calibrated: bool = False
     ios: bool = False

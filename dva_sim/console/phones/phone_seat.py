@@ -43,7 +43,7 @@ class PhoneSeat:
         registered: True once the DVA has registered it.
         settings: Calibration.
         orientation: Orientation of its screen [deg].
-        tilt: Makes commands: those of the drive that goes on, or else what its screen shows.
+        tilt: Makes the commands of the drive that goes on, or else the readings of its screen.
         samples: Number of samples received.
         lost: Number of samples missing, by their numbers.
         motion: File of its motion, if its person agrees.
@@ -80,6 +80,10 @@ class PhoneSeat:
     def driven(self) -> HeldRobot | None:
         """The robot that is driven with it."""
         return next((each for each in self._held if each.is_driven), None)
+
+    def holds(self, robot: str) -> bool:
+        """Return True if a robot is in its hands, by its id."""
+        return any(held.robot == robot for held in self._held)
 
     @property
     def _held(self) -> list[HeldRobot]:
@@ -168,8 +172,6 @@ class PhoneSeat:
         driven = self.driven
         if driven is not None and self.tilts:
             driven.tilted(samples.first + len(samples.at) - 1, self._at)
-        elif driven is None:
-            self.tilt.look(self._clock.now)  # the screen shows what would be sent
         return True
 
     def _take_one(self, stamp: float, age: float, xyz: Triple) -> None:
@@ -209,7 +211,7 @@ class PhoneSeat:
             now: Real time [s].
         """
         settings = self.settings
-        (level, turn) = self.tilt.shown
+        (level, turn) = (0.0, 0.0) if self.driven is None else self.tilt.shown
         held = next(iter(self._held), None)
         profile = self._profile
         rate = self.rate_hz

@@ -61,6 +61,8 @@ class Phones:
         self.by_client: dict[str, PhoneSeat] = {}
         self.motion_folder: Path | None = None
         self._used: set[int] = set()
+        named = run.scenario.phone.profile
+        self._pipeline = named if named in PIPELINES else PhoneSettings.pipeline
 
     def seat(self, client: str) -> PhoneSeat | None:
         """The phone of a page, from its first word on; None: there are too many."""
@@ -70,6 +72,7 @@ class Phones:
             setup = self._console().setup
             hz = self._console().phone.sample_rate_hz
             seat = PhoneSeat(self._clock, self.profile, hz, setup.attempts)
+            seat.calibrate(PhoneSettings(pipeline=self._pipeline))
             self.by_client[client] = seat
         return self.by_client[client]
 
@@ -82,6 +85,11 @@ class Phones:
         phone = PhoneConfig(profile=settings.pipeline, **settings.changes)
         return phone_profile(self._run.scenario.model_copy(update={"phone": phone}))
 
+    def pattern_of(self, robot: str) -> str | None:
+        """Return the pattern of the phone that holds a robot, by its id; None: any will do."""
+        held = (seat for seat in self.by_client.values() if seat.holds(robot))
+        return next((PIPELINES[seat.settings.pipeline] for seat in held), None)
+
     def offer(self) -> PhoneOffer:
         """Return the choices of a phone's page."""
         default = self.profile(PhoneSettings())
@@ -90,6 +98,7 @@ class Phones:
                 name: self.profile(PhoneSettings(pipeline=name)).model_dump(mode="json")
                 for name in PIPELINES
             },
+            "pipeline": self._pipeline,
             "filters": known_filters(),
             "mappings": known_mappings(),
             "speed_step_mps2": default.speed_step_mps2,

@@ -132,7 +132,7 @@ class Feed:
 
     def pattern_of(self, robot: str) -> str:
         """The name of the pattern by which a robot is driven next, or now."""
-        return self._run.stage.pattern_names.get(robot, self._run.scenario.pattern)
+        return self._run.stage.pattern_name(robot)
 
     def people(self) -> list[DoingShown]:
         """Return the activities of people on foot."""

@@ -150,6 +150,7 @@ class PhoneOffer(TypedDict):
     """Choices of a phone."""
 
     pipelines: dict[str, dict[str, Any]]
+    pipeline: str
     filters: list[str]
     mappings: list[str]
     speed_step_mps2: float

@@ -28,6 +28,7 @@ class DriveShown(TypedDict):
     command_age_ms: float | None
     picture_ms: int | None
     picture_arrived_ms: int | None
+    silent_s: float | None
     loop_ms: float | None
     input: InputHeard | None
     sent: int

@@ -93,6 +93,10 @@ class DrivenRun(DrivenSystem):
         return super().mode_of(robot) if agent is None else agent.controller.mode.value
 
     @override
+    def pattern_of(self, robot: str) -> str:
+        return self._run.stage.pattern_name(robot)
+
+    @override
     def reach(self, robot: str) -> Reach:
         return self._run.stage.reach(robot)
 

@@ -120,6 +120,7 @@ class ConsoleWorld(ConsolePages):
         self.sliders = LinkSliders(self.run, self.windows.set_usual, emulated)
         real = self.sockets.dva if self.sockets is not None else None
         self.phones = Phones(self.run, self.clock, lambda: self.seating.console, real)
+        self.run.stage.app_pattern = self.phones.pattern_of
         if self.sockets is not None:
             self.sockets.join("console", SCREEN)
         self.screens = Screens(

@@ -165,6 +165,8 @@ class Stage:
         cameras: Addresses of the robots' pictures.
         devices: Devices that take part.
         pattern_names: Pattern of the commands for a robot, by its id, where it was changed.
+        app_pattern: Function that returns the pattern of the app that holds a robot, if it has
+            one of its own.
         attended: True if people may join, who could release a robot after an emergency.
         regions: Division of the site, with a DVA for each region; None: there is one DVA.
 
@@ -182,6 +184,7 @@ class Stage:
     cameras: Cameras = OVER_ZMQ
     devices: list[AgentDevice] = field(default_factory=list)
     pattern_names: dict[str, str] = field(default_factory=dict)
+    app_pattern: Callable[[str], str | None] = lambda _: None
     attended: bool = False
 
     def __post_init__(self) -> None:
@@ -223,9 +226,13 @@ class Stage:
         configured = self.scenario.dva.severity
         return self.attended if configured is None else configured == "followed"
 
+    def pattern_name(self, robot: str) -> str:
+        """Return the name of the pattern of a robot's next drive, by its id."""
+        return self.pattern_names.get(robot) or self.app_pattern(robot) or self.scenario.pattern
+
     def pattern_for(self, robot: str) -> Pattern:
         """Return the pattern of the next drive of a robot, by its id."""
-        name = self.pattern_names.get(robot, self.scenario.pattern)
+        name = self.pattern_name(robot)
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:

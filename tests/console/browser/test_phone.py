@@ -76,6 +76,29 @@ def test_tilting_drives_and_a_swipe_down_stops(hand):
     hand.is_driving()
 
 
+def test_the_dissertations_app_names_its_pattern_and_tells_a_steady_tilt_from_a_lost_link(hand):
+    hand.hold()
+    hand.go("Calibration")
+    hand.page.get_by_label("Pipeline").select_option("dissertation")
+    hand.calibrate()
+    hand.go("Teleoperation")
+    expect(hand.status("Pattern")).to_have_text("REQ/REP")
+    hand.start()
+    hand.tilt(FORWARDS)
+    hand.speed("0.20")
+    expect(hand.status("Doing")).to_contain_text("This pipeline sends a steady tilt once")
+    expect(hand.status("Link")).to_contain_text("ms")
+    hand.tap("Stop")
+    hand.speed("0.00")
+
+
+def test_a_turn_of_the_screen_ends_the_drive_without_a_red_box(hand):
+    hand.drive()
+    hand.page.evaluate("screen.orientation.dispatchEvent(new Event('change'))")
+    hand.alert("The screen was rotated. The robot was stopped.")
+    expect(hand.page.locator(".alerts .warning")).to_have_count(0)
+
+
 def test_samples_are_raw_numbered_and_bear_the_phones_own_times(hand):
     hand.drive()
     assert becomes(lambda: len(hand.sent("samples")) > 40)
@@ -128,7 +151,7 @@ def test_a_page_that_stands_still_for_a_moment_does_not_blame_the_sensor(hand):
         "{ const from = performance.now(); while (performance.now() < from + 450); }"
     )
     hand.tilt(FORWARDS)
-    hand.speed("0.20")
+    assert becomes(lambda: hand.sent("samples")[-1]["xyz"][-1] == [*FORWARDS])
     assert hand.sent("gone") == []
 
 

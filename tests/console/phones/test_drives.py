@@ -54,6 +54,56 @@ def test_a_phone_drives_by_tilt(driving):
     assert driving.seat()["phase"] == "driving"
 
 
+def test_after_a_stop_it_shows_the_speed_of_a_robot_that_stands(driving):
+    driving.held.tilt(10.3, 10.0)
+    driving.let(1.0)
+    assert driving.phone()["speed_mps"] > 0.2
+    assert driving.phone()["radius_deg"] > 5
+    assert driving.do("stop")[0]
+    driving.let(1.0)
+    assert (driving.phone()["speed_mps"], driving.phone()["radius_deg"]) == (0.0, 0)
+    assert driving.phone()["reading"][0] > 4.0  # it is tilted still
+
+
+def drive_of(page):
+    return page.seat()["drives"][0]
+
+
+def test_the_dissertations_app_asks_and_waits_unless_the_console_chooses(page):
+    page.drives_by_tilt(pipeline="dissertation", then=2.0)
+    assert drive_of(page)["pattern"] == "req-rep"
+    assert page.robot().body.speed == pytest.approx(0.25, abs=0.05)
+    assert drive_of(page)["answered"] == drive_of(page)["sent"] > 0
+    assert page.do("pattern", robot=0, name="pub-sub")[0]
+    assert page.do("start")[0]
+    page.held.tilt(15.0)
+    page.let(2.0)
+    assert drive_of(page)["pattern"] == "pub-sub"
+    assert drive_of(page)["answered"] == 0 < drive_of(page)["sent"]
+
+
+def test_a_scenario_of_that_phone_is_driven_so_by_a_phone_without_a_calibration(monkeypatch):
+    page = PhonePage(monkeypatch, phone={"profile": "dissertation"})
+    assert page.world.scene()["phone"]["pipeline"] == "dissertation"
+    page.register()
+    page.permit()
+    assert page.phone()["pipeline"] == "dissertation"
+    assert drive_of(page)["pattern"] == "req-rep"
+    assert page.do("release")[0]
+    assert page.world.driven.pattern_of(page.robot().device.id_tag) == "latest-wins"
+
+
+def test_a_steady_tilt_that_is_sent_once_is_no_lost_link_and_the_robots_end_ends_the_drive(page):
+    page.drives_by_tilt(pipeline="dissertation", then=20.0)
+    assert page.robot().body.speed == pytest.approx(0.0, abs=0.01)
+    assert (page.seat()["alert"], drive_of(page)["silent_s"]) == ("", 0)
+    page.let(20.0)  # the robot gives up after 30 s
+    assert page.robot().controller.mode is Mode.IDLE
+    assert "the robot has ended the drive" in page.seat()["alert"]
+    assert page.seat()["phase"] == "held"
+    assert page.do("start")[0]
+
+
 def test_it_turns_left_for_a_phone_whose_left_edge_goes_down(driving):
     driving.held.tilt(5.0, 10.0)
     driving.let(1.5)
@@ -162,7 +212,7 @@ def test_readings_are_live_before_anybody_registers_or_calibrates(page):
     held.tilt(30.0)
     page.let(1.0)
     assert page.phone()["reading"][0] > 13  # without limits
-    assert page.phone()["speed_mps"] == 0.5
+    assert page.phone()["speed_mps"] == 0.0  # nobody drives
 
 
 @pytest.mark.parametrize("pipeline", ["default", "dissertation"])

@@ -53,7 +53,7 @@
  */
 /**
  * Choices of a phone.
- * @typedef {{pipelines: Record<string, Record<string, any>>, filters: string[],
+ * @typedef {{pipelines: Record<string, Record<string, any>>, pipeline: string, filters: string[],
  *   mappings: string[], speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number,
  *   limits: PhoneLimits}} PhoneOffer
  */
@@ -282,9 +282,9 @@
  * A robot in somebody's hands.
  * @typedef {{i: number | null, pattern: string, phase: string, mode: string, session: number |
  *   null, wanted: number[], command: number[], command_age_ms: number | null, picture_ms: number |
- *   null, picture_arrived_ms: number | null, loop_ms: number | null, input: InputHeard | null,
- *   sent: number, answered: number, timeouts: number, refused: number, superseded: number,
- *   round_trip_ms: number | null, outcome: string | null}} Drive
+ *   null, picture_arrived_ms: number | null, silent_s: number | null, loop_ms: number | null,
+ *   input: InputHeard | null, sent: number, answered: number, timeouts: number, refused: number,
+ *   superseded: number, round_trip_ms: number | null, outcome: string | null}} Drive
  */
 /**
  * A phone in somebody's hand.

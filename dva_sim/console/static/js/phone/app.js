@@ -4,6 +4,7 @@ import { connection, scene, seat } from '../store.js';
 import { resumeStops } from '../net/emergency.js';
 import { interrupted } from '../drive/hold.js';
 import { Notices } from '../ui/notices.js';
+import { capital } from '../ui/words.js';
 import { AuthenticationScreen } from './authentication.js';
 import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
@@ -71,18 +72,22 @@ function Waiting() {
   return html`<p class="soft">${lost ? 'The console cannot be reached. Retrying …' : 'Waiting for the console …'}</p>`;
 }
 
-/** Current problems, each with its consequence. */
+const STOPPED = 'stopped: '; // begins what the console says of an ended drive
+
+/** Current problems, each with its consequence; that a drive has ended by a cause in the hand is none. */
 function Alerts() {
+  const alert = seat.value?.alert ?? '';
   const ended = !['open', 'connecting', 'lost'].includes(connection.value);
   const texts = [
     connection.value === 'lost' &&
       'link lost: the console cannot be reached. The robot stops by itself. Trying again …',
     ended && `The simulation has ended: ${connection.value}`,
-    seat.value?.alert,
-    interrupted.value && `${interrupted.value} The robot was stopped; start again when you are ready.`,
+    alert.startsWith(STOPPED) ? '' : alert,
   ];
+  const ending = interrupted.value ? `${interrupted.value} The robot was stopped.` : alert.startsWith(STOPPED) && `${capital(alert)}.`;
   return html`<div class="alerts" role="alert">
     <${Notices} others=${texts} />
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
+    ${ending && html`<p class="told">${ending} Start again when you are ready.</p>`}
   </div>`;
 }

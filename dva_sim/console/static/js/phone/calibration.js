@@ -70,6 +70,7 @@ function useDefaults() {
     choose({
       force: kept.force || String(offer?.speed_step_mps2 ?? 0.35),
       radius: kept.radius || String(offer?.turn_step_mps2 ?? 0.12),
+      pipeline: kept.pipeline || (offer?.pipeline ?? ''),
       delay: kept.delay || String(Math.round(1000 * (offer?.max_delay_s ?? 0.5))),
     });
   }, [offer]);

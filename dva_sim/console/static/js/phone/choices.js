@@ -21,7 +21,7 @@ const FIRST = {
   force: '',
   radius: '',
   delay: '',
-  pipeline: 'default',
+  pipeline: '',
   filter: '',
   mapping: 'absolute',
   reference: null,

@@ -158,6 +158,10 @@ function feelDrive() {
   });
 }
 
-/** True if the robot or the console cannot be reached. */
-export const isLinkLost = () =>
-  connection.value === 'lost' || Boolean(seat.value?.alert.includes('link lost'));
+const SILENT_ROBOT_S = 3;
+
+/** True if the robot or the console cannot be reached; an alert of before counts until the robot is heard again. */
+export const isLinkLost = () => {
+  const silent = seat.value?.drives[0]?.silent_s ?? Infinity;
+  return connection.value === 'lost' || (Boolean(seat.value?.alert.includes('link lost')) && silent > SILENT_ROBOT_S);
+};

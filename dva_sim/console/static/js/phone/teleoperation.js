@@ -1,6 +1,6 @@
 /** Driving screen: the robot's picture over the whole screen, with the controls. */
 import { html, useEffect, useMemo, useState } from '../../vendor/preact.js';
-import { clock, maySteer, rowOf, rows, seat } from '../store.js';
+import { clock, driveOf, maySteer, rowOf, rows, scene, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { placeOf } from '../map/shown.js';
@@ -66,11 +66,12 @@ function Figures({ one }) {
   const drive = seat.value?.drives.find((each) => (each.i ?? -1) === one.i);
   const [speed, turn] = drive?.command ?? [0, 0];
   const degrees = phone.value ? phone.value.radius_deg : Math.trunc((turn * 180) / Math.PI);
+  const pattern = scene.value?.patterns.find((each) => each.name === drive?.pattern);
   const metres = phone.value ? phone.value.speed_mps : speed;
   return html`<div class="figures-phone reported">
     <span role="status" aria-label="Radius" aria-live="off">Radius: ${degrees}°</span>
     <span role="status" aria-label="Speed" aria-live="off">Speed: ${metres.toFixed(2)}m/s</span>
-    <small>command ${msText(drive?.command_age_ms ?? null)} old</small>
+    <small><span role="status" aria-label="Pattern">${pattern?.label ?? drive?.pattern}</span>, command ${msText(drive?.command_age_ms ?? null)} old</small>
   </div>`;
 }
 
@@ -104,10 +105,18 @@ function Hint({ one }) {
   }
   if (choices.value.hold && tilts.value && !thumb.value) return 'Hold your thumb on the picture and tilt.';
   const blind = Math.floor(pictureAge(one.i) / 1000);
-  if (blind >= TELLING_S) return `No picture for ${blind} s: the link may be lost. The robot stops by itself.`;
+  if (blind >= TELLING_S) {
+    const silent = driveOf(one.i)?.silent_s ?? 0;
+    return `No picture for ${blind} s. ${silent < TELLING_S ? 'The robot is heard.' : `Nothing of the robot for ${silent} s: it stops by itself.`}`;
+  }
   const why = rowOf(one.i)?.stop_reason;
-  return why ? `Stopped: ${why}.` : 'Driving. Swipe down to stop.';
+  if (!why) return 'Driving. Swipe down to stop.';
+  const steady = why.startsWith('no command') && !repeats() ? ' This pipeline sends a steady tilt once: tilt anew.' : '';
+  return `Stopped: ${why}.${steady}`;
 }
+
+/** True unless the phone's pipeline sends a tilt only when it has changed. */
+const repeats = () => !tilts.value || scene.value?.phone?.pipelines[phone.value?.pipeline ?? '']?.send !== 'on_change';
 
 /** Current order, with buttons to report what the driver saw there. */
 function Order() {
