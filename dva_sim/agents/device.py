@@ -30,6 +30,7 @@ HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none is a prefix 
 STATUS = "status|"
 HOLDER = "holder|"
 EMERGENCY = "emergency|"
+MISSION = "mission|"
 EVENT = "event|"
 AUDIT = "audit|"
 PEER_STATUS = "peer|"

@@ -11,9 +11,9 @@ import pymunk
 import pytest
 from helpers.dva.permissions import enter
 
-from dva_sim.agents.device import command_topic, do_nothing
+from dva_sim.agents.device import MISSION, command_topic, do_nothing
 from dva_sim.agents.robot.command_queue import EACH
-from dva_sim.agents.robot.robot import FRAME, MISSION, RobotAgent
+from dva_sim.agents.robot.robot import FRAME, RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.kernel.recorder import Accepted
 from dva_sim.network.messaging import Request, Requester

@@ -16,6 +16,7 @@ from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.handheld import Console, Input, OnResult
+from dva_sim.agents.operator.held_missions import MISSIONS, HeldMissions
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.velocity import GivenVelocity
@@ -56,6 +57,7 @@ class HeldRobot:
         last: The newest input.
         level: Level of the requested permission.
         app: Function that makes the commands of the newest drive.
+        missions: Missions of the robot, if the permission is for them.
     """
 
     def __init__(
@@ -93,6 +95,7 @@ class HeldRobot:
         self.level = "teleoperation"
         self._wished = self.last
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
+        self.missions: HeldMissions | None = None
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
         self._status: Subscription | None = None
@@ -169,10 +172,10 @@ class HeldRobot:
 
     def _be_gone(self) -> None:
         self.phase = "gone"
-        for heard in (self._picture, self._status):
+        for heard in (self._picture, self._status, self.missions):
             if heard is not None:
                 heard.close()
-        self._picture = self._status = None
+        self._picture = self._status = self.missions = None
         self._let_go(self)
 
     def _watch(self) -> None:
@@ -198,6 +201,8 @@ class HeldRobot:
         network = self.device.network
         me = self.device.id_tag
         self._status = network.subscribe(me, self.robot, STATUS, self._on_status)
+        if self.level in MISSIONS:
+            self.missions = HeldMissions(self.device, self.robot, lambda: self.session)
         self.device.clock.call_after(self._lost_after, self._unanswered)
 
     @property

@@ -10,6 +10,7 @@ from dva_sim.agents.device import (
     EMERGENCY,
     HOLDER,
     LONGEST_BID,
+    MISSION,
     STATUS,
     AgentDevice,
     command_topic,
@@ -61,7 +62,6 @@ RESTRICTED = HOLDERS_ONLY | DVAS_ONLY
 DRIVING = m.StartTeleOp, m.SetTeleOp
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
-MISSION = "mission|"  # topic of how missions stand
 STATUS_PERIOD = 1.0  # [s]
 WAKES_UP = 1.0  # what arrives so soon after a sleep may have been sent before its end [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]

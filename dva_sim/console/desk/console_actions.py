@@ -11,6 +11,7 @@ from dva_sim.console.desk.console_pages import ConsolePages
 from dva_sim.console.driving.decision_actions import DecisionActions
 from dva_sim.console.driving.desk_actions import DeskActions, instructions_of
 from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
+from dva_sim.console.driving.mission_actions import MissionActions
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import LogsLooked, PagesHere, RobotsWatched
@@ -43,7 +44,8 @@ class ConsoleActions:
             author=pages.author,
         )
         server = ServerActions(pages.system.bench)
-        holders = self, driving, decisions, desk, alarms, pages.fakes, server
+        missions = MissionActions(pages.driven, pages.rooms, driving)
+        holders = self, driving, decisions, desk, missions, alarms, pages.fakes, server
         dispatcher = ActionDispatcher(
             place,
             holders=(*holders, *self.holders(driving)),

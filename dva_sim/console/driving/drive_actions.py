@@ -13,6 +13,7 @@ from typing import Any, Protocol, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.operator.handheld import Gathered
+from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.console.asking.answers import BYE
@@ -23,11 +24,13 @@ from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.events.takeover import Takeover
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
+    OfRobot,
     OfRobots,
     OfSome,
     PagesHere,
     PatternChoice,
     SampleBatch,
+    TakeAsked,
     Wish,
 )
 from dva_sim.console.wire.limits import SILENT_AFTER
@@ -100,7 +103,7 @@ class Driving:
         return person
 
     @does("take")
-    def take(self, client: str, line: OfRobots, on_result: OnResult) -> None:
+    def take(self, client: str, line: TakeAsked, on_result: OnResult) -> None:
         """Take robots into the seat of a page, which gets one."""
         robots = self.robots_in(line)
         number = self._sit(client, self._seating.seat_of_order(robots))
@@ -118,7 +121,7 @@ class Driving:
             on_result(ok, text if ok or not holders else f"{text}. {holders}")
 
         self._system.introduce(person.device, robots)
-        person.take(robots, answered)
+        person.take(robots, answered, line.get("level", "teleoperation"))
 
     def _sit(self, client: str, rather: int | None = None) -> int:
         """Return the number of a page's seat, which has a person from then on.
@@ -212,6 +215,18 @@ class Driving:
         if not given:
             raise Refused("No robot was named.")
         return list(dict.fromkeys(self.robot(one) for one in given))
+
+    def held(self, client: str, line: OfRobot) -> HeldRobot:
+        """Return the robot that a line names, in the hands of a page's person.
+
+        Raises:
+            Refused: the person does not hold it.
+        """
+        robot = self.robot(line["robot"])
+        held = self.person(client).robots.get(robot)
+        if held is None:
+            raise Refused(f"You do not hold {self._system.label_of(robot)}.")
+        return held
 
     def robot(self, given: Any) -> str:
         """Id of a robot by its number or label.
@@ -374,7 +389,7 @@ class Driving:
         except (Refused, DvaSimError) as error:
             on_result(False, str(error))
             return
-        take = partial(self.take, client, OfRobots(robots=[robot]))
+        take = partial(self.take, client, TakeAsked(robots=[robot]))
 
         def ended(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if not ok and not seat.robots:

@@ -12,7 +12,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.scenes import OrderShown
-from dva_sim.console.wire.seats import DriveShown, InputHeard, PhoneShown, SeatLine
+from dva_sim.console.wire.seats import DriveShown, InputHeard, MissionShown, PhoneShown, SeatLine
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 
@@ -142,6 +142,8 @@ class SeatLines:
         command = log.commands[-1][1:] if log.commands and not is_over else (0.0, 0.0)
         return {
             "i": system.number_of(held.robot),
+            "level": held.level,
+            "mission": _mission_shown(held),
             "pattern": system.pattern_of(held.robot),
             "phase": held.phase,
             "mode": system.mode_of(held.robot),
@@ -165,3 +167,14 @@ class SeatLines:
             "round_trip_ms": round(1000 * trips[-1], 1) if trips else None,
             "outcome": log.outcome if is_over else None,
         }
+
+
+def _mission_shown(held: HeldRobot) -> MissionShown | None:
+    status = None if held.missions is None else held.missions.status
+    if status is None:
+        return None
+    return {
+        "state": status.mission_state,
+        "places_left": status.waypoints_left,
+        "reason": status.reason,
+    }

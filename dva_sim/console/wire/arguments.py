@@ -60,6 +60,11 @@ Kinds = Literal["fire", "gas_leak", "flood"]
 Severity = Literal["low", "medium", "high", "critical"]
 
 
+Level = Literal["teleoperation", "missions", "both"]
+# Places on the site, each x and y [m].
+Places = Annotated[list[Annotated[list[Coordinate], Several(2, 2)]], Several(0, 64)]
+
+
 class Nothing(TypedDict):
     """No arguments."""
 
@@ -68,6 +73,12 @@ class OfRobots(TypedDict):
     """Some robots."""
 
     robots: Robots
+
+
+class TakeAsked(OfRobots):
+    """Robots, and what one may do with them; by default, drive them."""
+
+    level: NotRequired[Level]
 
 
 class OfRobot(TypedDict):
@@ -162,7 +173,7 @@ class PhoneIdentity(TypedDict):
 class PhoneWish(OfDevice):
     """A permission that a phone asks for."""
 
-    level: Literal["teleoperation", "missions", "both"]
+    level: Level
 
 
 class CalibrationAsked(TypedDict):
@@ -280,6 +291,14 @@ class ModeAsked(TypedDict):
 
 class MissionAsked(OfRobot, WithReason):
     """A robot for an event."""
+
+
+class MissionOrdered(OfRobot):
+    """A mission of a robot that one holds: over places, to an event, or back."""
+
+    what: Literal["go_to", "patrol", "inspect", "return_to_base"]
+    places_m: NotRequired[Places]
+    event: NotRequired[EventNumber]
 
 
 class FindingAsked(OfEvent):

@@ -15,10 +15,20 @@ class InputHeard(TypedDict):
     at_ms: float
 
 
+class MissionShown(TypedDict):
+    """State of the newest mission of a robot in somebody's hands."""
+
+    state: str
+    places_left: int
+    reason: str
+
+
 class DriveShown(TypedDict):
     """A robot in somebody's hands."""
 
     i: int | None
+    level: str
+    mission: MissionShown | None
     pattern: str
     phase: str
     mode: str

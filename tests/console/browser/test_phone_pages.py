@@ -15,19 +15,26 @@ TALLEST = 48  # of what is tapped, at least [px]
 
 
 def screens(hand: Hand) -> list[tuple[str, Callable[[], None]]]:
-    """All five, and Teleoperation with a robot in hand, in an order that comes back."""
+    """All five, and those of a robot in hand, in an order that comes back."""
 
     def at(name: str) -> Callable[[], None]:
         return lambda: hand.go(name)
 
     def cockpit() -> None:
-        hand.hold("robot-2")
+        hand.register()
+        hand.take("robot-2", "both")
+        expect(hand.page.get_by_text("is in your hands")).to_be_visible()
         hand.calibrate()
         hand.go("Teleoperation")
         expect(hand.status("Radius")).to_be_visible()
 
     names = ("Main", "Instructions", "Authentication", "Calibration", "Teleoperation")
-    return [*((name, at(name)) for name in names), ("driving", cockpit)]
+
+    def missions() -> None:
+        hand.go("Missions")
+        expect(hand.page.get_by_role("button", name="Send robot-2")).to_be_visible()
+
+    return [*((name, at(name)) for name in names), ("driving", cockpit), ("missions", missions)]
 
 
 def too_wide(page: Page, width: int) -> bool:

@@ -12,6 +12,8 @@ export const PATIENCE_MS = {
  "confirm": 65000,
  "refute": 65000,
  "decline": 10000,
+ "mission_order": 65000,
+ "mission_cancel": 65000,
  "tour": 10000,
  "tour_time": 10000,
  "mark": 10000,

@@ -1,5 +1,5 @@
 /** Controls to take, start, drive, stop and release; and the robot's current mode. */
-import { html, useEffect, useRef } from '../../vendor/preact.js';
+import { html, signal, useEffect, useRef } from '../../vendor/preact.js';
 import { clock, connection, floorMs, mayDrive, maySteer, modeOf, rowOf, rows, seat, whyStopped } from '../store.js';
 import { act } from '../net/actions.js';
 import { DriveSliders } from './drive_sliders.js';
@@ -8,6 +8,9 @@ import { held, interrupted, wish } from './hold.js';
 import { Stick } from './stick.js';
 
 /** @typedef {import('../lines.js').Thing} Thing */
+
+const LEVELS = ['teleoperation', 'missions', 'both'];
+const level = signal('teleoperation');
 
 /** @param {{robots: Thing[]}} props */
 export function Controls({ robots }) {
@@ -22,10 +25,13 @@ export function Controls({ robots }) {
     max_turn_rate_radps: Math.min(...robots.map((robot) => robot.max_turn_rate_radps || 0.52)),
   };
   return html`<section class="panel controls" aria-label="Driving">
-    <div class="statuses"><span>Mode</span><${Mode} robots=${robots} /></div>
+    <div class="statuses"><span>Mode</span><${Mode} robots=${robots} />
+      <label class="level"><span>Permission</span> <select aria-label="Permission level" value=${level.value} disabled=${!may || holds}
+        onChange=${(/** @type {any} */ change) => (level.value = change.target.value)}>
+        ${LEVELS.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}</select></label></div>
     <div class="buttons" ref=${useNextButton(may ? NEXT[phase] : undefined)}>
       <button type="button" disabled=${!may || holds}
-        onClick=${() => act('take', { robots: robots.map((robot) => robot.i) })}>Take control</button>
+        onClick=${() => act('take', { robots: robots.map((robot) => robot.i), level: level.value })}>Take control</button>
       <button type="button" class=${phase === 'held' && canStart ? 'go' : ''} disabled=${!may || !canStart}
         onClick=${() => act('start')}>Start</button>
       <button type="button" class=${phase === 'driving' ? 'go' : ''} disabled=${!may || !holds}

@@ -5,6 +5,7 @@ import { driveLost } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { LinkPanel } from '../network/link_panel.js';
 import { MapBox } from '../map/map_box.js';
+import { Missions, hasMissions, missionGoals, place } from '../missions/missions.js';
 import { driven } from '../shell/route.js';
 import { tourGoals } from '../tour/progress.js';
 import { CameraPicture } from './camera.js';
@@ -28,6 +29,7 @@ export function DrivePage() {
   useEffect(() => {
     if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
   }, [connection.value, driveLost.value]);
+  const goers = robots.filter((robot) => seat.value && hasMissions(robot.i));
   const two = robots.length > 1;
   return html`<main class=${two ? 'page drive-page two' : 'page drive-page'} id="main" tabindex="-1">
     <h1 class="hidden">Drive</h1>
@@ -40,12 +42,17 @@ export function DrivePage() {
     </section>
     <section class="map-region" aria-label="Map">
       <${MapBox} cones=${() => driven.peek().map((robot) => robot.i)} keyboard=${false}
-        follows=${() => driven.peek()[0]?.i ?? null} goals=${tourGoals} />
+        follows=${() => driven.peek()[0]?.i ?? null} goals=${goals}
+        onPlace=${goers.length ? place : undefined} />
     </section>
-    <div class="side"><${Alert} /><${OrderInHand} /><${Controls} robots=${robots} /><${LinkPanel} /></div>
+    <div class="side"><${Alert} /><${OrderInHand} /><${Controls} robots=${robots} />
+      ${goers.map((robot) => html`<${Missions} key=${robot.i} robot=${robot} />`)}<${LinkPanel} /></div>
     <${Latency} robots=${robots} />
   </main>`;
 }
+
+/** Places to go to: of the tour, or of a mission. */
+const goals = () => [...tourGoals(), ...missionGoals()];
 
 /** Start steering by keys and gamepad; return a function that stops it. */
 function steering() {

@@ -6,7 +6,6 @@ import { interrupted } from '../drive/hold.js';
 import { Notices } from '../ui/notices.js';
 import { capital } from '../ui/words.js';
 import { AuthenticationScreen } from './authentication.js';
-import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
 import { robot } from './drive.js';
 import { EmergencyFooter } from './emergency_footer.js';
@@ -20,10 +19,11 @@ const MAP = ['/static/css/map.css', '/static/vendor/leaflet.css'];
 const BODIES = /** @type {Record<string, any>} */ ({
   main: MainScreen,
   authentication: AuthenticationScreen,
-  calibration: CalibrationScreen,
+  calibration: lazy(async () => (await import('./calibration.js')).CalibrationScreen),
   instructions: lazy(async () => (await import('./instructions.js')).InstructionsScreen),
   teleoperation: TeleoperationScreen,
   event: lazy(async () => (await import('./event.js')).EventScreen, MAP),
+  missions: lazy(async () => (await import('./missions.js')).MissionsScreen, MAP),
   report: lazy(async () => (await import('./report.js')).ReportScreen, MAP),
 });
 

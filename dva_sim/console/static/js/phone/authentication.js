@@ -4,6 +4,7 @@ import { isOperator, mayDrive, maySteer, notice, robots, scene, seat, thingAt } 
 import { act } from '../net/actions.js';
 import { choices, choose } from './choices.js';
 import { holds, phone, robot } from './drive.js';
+import { SCREENS } from './screens.js';
 import { Choice, Field } from '../ui/fields.js';
 
 const TYPES = /** @type {[string, string][]} */ (
@@ -32,8 +33,14 @@ export function AuthenticationScreen() {
   </ol>
   ${holds.value && html`<div class="thumb"><p>${robot.value?.label ?? 'The robot'} is in your hands.</p>
     <button type="button" onClick=${() => act('release')}>Give it back</button>
-    <a class="big go" href=${phone.value?.calibrated ? '#/teleoperation' : '#/calibration'}>
-      Go on: ${phone.value?.calibrated ? 'Teleoperation' : 'Calibration'}</a></div>`}`;
+    <a class="big go" href=${`#/${next()}`}>
+      Go on: ${SCREENS[next()]}</a></div>`}`;
+}
+
+/** Screen on which the permission is used, or prepared for. */
+function next() {
+  if (phone.value?.level === 'missions') return 'missions';
+  return phone.value?.calibrated ? 'teleoperation' : 'calibration';
 }
 
 /** Fill empty fields with what the console knows. */

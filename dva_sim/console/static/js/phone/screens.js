@@ -8,11 +8,12 @@ export const SCREENS = /** @type {Record<string, string>} */ ({
   calibration: 'Calibration',
   instructions: 'Instructions',
   teleoperation: 'Teleoperation',
+  missions: 'Missions',
   event: 'Event',
   report: 'Report',
 });
 /** Screens of the menu. */
-export const MENU = ['authentication', 'calibration', 'instructions', 'teleoperation', 'report'];
+export const MENU = ['authentication', 'calibration', 'instructions', 'teleoperation', 'missions', 'report'];
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => (hash.value = location.hash));
 
