@@ -52,6 +52,8 @@ class PersonGuard(OnFoot):
         attended: True if a person plays it.
         answered: True once the person has accepted the order.
         alert: Message for the person.
+        wanted: Event to which the person goes of their own accord: its order is accepted at once;
+            0: there is none.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class PersonGuard(OnFoot):
         self._contain = contain
         self.attended = self.answered = self._needs_help = False
         self.alert = ""
+        self.wanted = 0
         self._stage = ""  # of the order: departed, arrived
         self._order_at: Point = walking.place
         self._protocol = GuardProtocol(device.dva, 0.0, self._is_at)
@@ -259,6 +262,9 @@ class PersonGuard(OnFoot):
             self.alert = ""
             self.device.tell(f"is asked to go to event {errand.order.event_id}", "order")
             self.device.clock.call_after(DECLINED_AFTER, self._decline_alone, errand.order)
+            if errand.order.event_id == self.wanted:
+                self.device.clock.call_after(0.0, self.answer, True, "", do_nothing)
+            self.wanted = 0
 
     def _decline_alone(self, order: m.Order) -> None:
         """Decline the order, as nobody plays the guard."""

@@ -103,6 +103,7 @@ class ConsoleRooms:
         role: str,
         on_result: OnResult,
         then: Callable[[ControlRoomAgent, OnResult], object],
+        name: str = "",
     ) -> None:
         """Call `then` with the control room of a page; it gets one with its first decision."""
 
@@ -113,7 +114,7 @@ class ConsoleRooms:
             else:
                 on_result(False, text)
 
-        self.join(client, role, "", joined)
+        self.join(client, role, name, joined)
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
         """A page's person gets a device of its role, or its device gets another name."""

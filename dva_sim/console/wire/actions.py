@@ -291,6 +291,7 @@ _LIST = (
     Action("guard_join", "plays a guard from then on", GuardAsked, seats=True),
     Action("guard_leave", "plays the guard no longer", stops=True),
     Action("guard_answer", "accepts or declines an order", GuardAnswer),
+    Action("guard_go", "has the DVA send oneself to an event, as a guard", OfEvent, over_link=True),
     Action("guard_say", "says how far one has come", GuardWord, over_link=True),
     Action(
         "guard_place",

@@ -49,7 +49,7 @@ class RunActions(ConsoleActions):
             deaf=world.run.deafened,
             slow=world.run.slowed,
         )
-        guards = GuardActions(world.guards, world.run.stage.site)
+        guards = GuardActions(world.guards, world.run.stage.site, world.rooms)
         return self._phones, self._at_robots, guards
 
     # --- what the run adds to driving --------------------------------------------------------

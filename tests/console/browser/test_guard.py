@@ -157,3 +157,24 @@ def test_the_place_by_satellite_counts_where_the_site_lies_there(console, visits
         expect(page.get_by_role("alert")).to_contain_text("not at this scenario’s site")
         assert sent(page, "guard_place") == []
     tap(page, "Leave")
+
+
+def test_a_guard_says_on_the_phones_page_of_an_event_that_he_goes(console, visits, desk):
+    running = console(*WORDS)
+    number = raised(desk, "gas leak", "Office 320")
+    page = visits(**SCREEN).tab()
+    page.goto(f"{running.phone}#/event?{number}")
+    who = page.get_by_label("I am", exact=True)
+    who.select_option("guard-3")
+    tap(page, "I go")
+    expect(page.get_by_role("heading", name="guard-3")).to_be_visible()
+    order = page.get_by_role("region", name="Order")
+    expect(order).to_contain_text("You: getting ready.")
+    expect(row_of(desk, number)).to_contain_text("guard-3")
+    tap(page, "Departed")
+    expect(order).to_contain_text("You: walking.")
+    page.goto(f"{running.phone}#/event?{number}")
+    expect(page.get_by_role("link", name="Follow the way there as guard-3")).to_be_visible()
+    expect(page.get_by_text("Goes there").locator("+ dd")).to_have_text("guard-3")
+    page.goto(running.guard)
+    tap(page, "Leave")

@@ -242,3 +242,61 @@ def test_what_is_as_usual_is_not_written(monkeypatch):
     written = build(load("hands-on"), {}).model_dump(mode="json")
     assert "kind" not in written["guard"]
     assert "kind" not in written["operator"]
+
+
+@pytest.fixture
+def own_way(monkeypatch):
+    """A guard whom a person plays, where Ana is asked about every event first."""
+    page = PhonePage(
+        monkeypatch,
+        client="g1",
+        guard__kind={2: "person"},
+        guard__mobilisation_s=3000,
+        robot__count=0,
+        bystander__count=0,
+        events=FIRE,
+        dispatch__mode="ask_first",
+        dispatch__decide_within_s=6000,
+    )
+    assert page.do("room_join", client="desk", name="Ana", role="dispatch")[0]
+    page.until(lambda: page.world.rooms.listener.events)
+    return page
+
+
+def test_a_guard_who_goes_of_their_own_accord_has_the_order_and_nobody_else_is_sent(own_way):
+    page = own_way
+    assert page.do("guard_join", guard="guard-2")[0]
+    assert event(page).state is State.PENDING
+    done = page.ask("guard_go", event=1)
+    assert (done["ok"], done["text"]) == (True, "you go to event 1")
+    page.let(1.0)
+    assert event(page).state is State.ASSIGNED
+    assert event(page).responder == guard(page).device.id_tag
+    assert line(page)["order"]["answered"] is True
+    assert guard(page).activity == "getting ready"
+    assert guard(page, 1).activity == "waiting"
+    assert [room["label"] for room in page.world.rooms.entries()] == ["Ana"]  # theirs is gone
+    assert page.do("guard_say", what="arrived")[0]
+    page.let(1.0)
+    assert event(page).state is State.ON_SCENE
+
+
+def test_who_goes_of_their_own_accord_plays_a_guard_and_names_an_event(own_way):
+    done = own_way.ask("guard_go", event=1)
+    assert (done["ok"], done["text"]) == (False, "Choose which guard you are first.")
+    assert own_way.do("guard_join", guard="guard-2")[0]
+    assert own_way.ask("guard_go", event=77)["text"] == "there is no event 77"
+
+
+def test_a_guard_goes_once_and_a_refusal_of_the_dva_is_told_in_words(own_way):
+    page = own_way
+    assert page.do("guard_join", guard="guard-2")[0]
+    assert page.ask("guard_go", event=1)["ok"]
+    page.let(1.0)
+    assert page.ask("guard_go", event=1)["text"] == "You are sent to event 1 already."
+    assert page.do("guard_say", what="refuted")[0]
+    page.let(1.0)
+    done = page.ask("guard_go", event=1)
+    assert not done["ok"]
+    assert done["text"].startswith("event 1 is refuted")
+    assert guard(page).wanted == 0

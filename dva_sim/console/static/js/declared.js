@@ -34,6 +34,7 @@ export const PATIENCE_MS = {
  "guard_join": 10000,
  "guard_leave": 10000,
  "guard_answer": 10000,
+ "guard_go": 65000,
  "guard_say": 65000,
  "guard_place": 10000,
  "guard_report": 65000,

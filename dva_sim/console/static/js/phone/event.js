@@ -1,10 +1,11 @@
 /** An event on the phone: what is known of it, its place, the picture of who goes, and the way there. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
-import { events, isAttached, maySteer, modeOf, notice, robots, rowOf, rows, tracks } from '../store.js';
+import { events, guard, isAttached, maySteer, modeOf, notice, robots, rowOf, rows, tracks } from '../store.js';
 import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
 import { watch } from '../net/sockets.js';
 import { CameraPicture } from '../drive/camera.js';
+import { playedGuards } from '../guard/played.js';
 import { MapBox } from '../map/map_box.js';
 import { isOpen, placeOf } from '../map/shown.js';
 import { SeverityMark } from '../ui/icon.js';
@@ -29,7 +30,7 @@ export function EventScreen() {
         <dt>Goes there</dt><dd>${event.assigned.join(', ') || 'nobody'}</dd>
         ${event.note && html`<dt>Note</dt><dd>${event.note}</dd>`}
       </dl></section>
-    ${isOpen(event) && html`<${Way} event=${event} />`}
+    ${isOpen(event) && html`<${Way} event=${event} /><${OwnWay} event=${event} />`}
     <section class="map-region small" aria-label="Map">
       <${MapBox} cones=${() => (goes ? [goes.i] : [])} legend=${false} keyboard=${false}
         goals=${() => [{ x: event.x_m, y: event.y_m, radius: 0.8, name: '' }]} /></section>
@@ -68,6 +69,29 @@ function Way({ event }) {
     ${free.length > 1 && html`<label class="field"><span>Another robot</span>
       <select value=${chosen.id} onChange=${(/** @type {any} */ change) => want(change.target.value)}>
         ${free.map((one) => html`<option key=${one.id} value=${one.id}>${one.label}</option>`)}</select></label>`}</div>`;
+}
+
+/** Button of a guard who goes there of their own accord. @param {{event: SiteEvent}} props */
+function OwnWay({ event }) {
+  const free = playedGuards.value;
+  const [chosen, choose] = useState('');
+  const [asking, ask] = useState(false);
+  const label = guard.value?.label || chosen || free[0]?.label;
+  if (!label) return null;
+  if (guard.value && event.assigned.includes(label)) return html`<a class="big go" href="/guard">Follow the way there as ${label}</a>`;
+  const go = async () => {
+    ask(true);
+    const joined = guard.peek() ? { ok: true } : await act('guard_join', { guard: label });
+    const done = joined.ok && (await act('guard_go', { event: event.number }));
+    ask(false);
+    if (done && done.ok) location.href = '/guard';
+  };
+  const others = event.assigned.length ? ` instead of ${event.assigned.join(', ')}` : '';
+  return html`<div class="buttons">
+    <button type="button" class="big" key="go" disabled=${asking || !maySteer.value} onClick=${go}>I go${others}</button>
+    ${!guard.value && html`<label class="field" key="who"><span>I am</span>
+      <select aria-label="I am" value=${label} onChange=${(/** @type {any} */ change) => choose(change.target.value)}>
+        ${free.map((one) => html`<option key=${one.i} value=${one.label}>${one.label}</option>`)}</select></label>`}</div>`;
 }
 
 /** Robots that nobody holds, the nearest first. @param {SiteEvent} event */

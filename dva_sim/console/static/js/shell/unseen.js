@@ -29,7 +29,8 @@ export function callByAlarms(act) {
  * @param {() => unknown} order number of the order in hand, if any
  */
 export function vibrateFor(isOnCall, order) {
-  const vibrate = () => isOnCall() && navigator.vibrate?.(PATTERN_MS);
+  const isAllowed = () => navigator.userActivation?.hasBeenActive ?? true; // not before the first tap
+  const vibrate = () => isOnCall() && isAllowed() && navigator.vibrate?.(PATTERN_MS);
   callByAlarms(vibrate);
   let known = order();
   effect(() => {
