@@ -58,6 +58,7 @@ class HeldRobot:
         level: Level of the requested permission.
         app: Function that makes the commands of the newest drive.
         missions: Missions of the robot, if the permission is for them.
+        offered: Sensors to which one may subscribe.
     """
 
     def __init__(
@@ -96,6 +97,7 @@ class HeldRobot:
         self._wished = self.last
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
         self.missions: HeldMissions | None = None
+        self.offered: tuple[m.Sensor, ...] = ()
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
         self._status: Subscription | None = None
@@ -183,6 +185,9 @@ class HeldRobot:
             self._picture = picture
             self._has_answered = True
 
+        def offered(sensors: tuple[m.Sensor, ...]) -> None:
+            self.offered = sensors
+
         def blind(url: str) -> None:
             self._has_answered = True
             self._alert(f"{self.label}: no camera to watch at {url!r}")
@@ -196,6 +201,7 @@ class HeldRobot:
             seen=seen,
             blind=blind,
             wanted=lambda: self.phase != "gone",
+            offered=offered,
             unreachable=self._unreachable,
         )
         network = self.device.network

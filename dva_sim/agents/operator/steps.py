@@ -30,6 +30,7 @@ def watch(
     seen: Callable[[Subscription], object],
     blind: Callable[[str], object],
     wanted: Callable[[], bool],
+    offered: Callable[[tuple[m.Sensor, ...]], object] = do_nothing,
     unreachable: Callable[[], object] = do_nothing,
 ) -> None:
     """Ask a robot where its camera is, and watch it.
@@ -43,13 +44,16 @@ def watch(
         seen: Callback once it is watched.
         blind: Callback with the URL, if there is nothing to see there.
         wanted: Predicate: True while it is still wanted.
+        offered: Callback for the sensors to which one may subscribe.
         unreachable: Callback if the robot does not reply.
     """
 
     def answered(reply: m.Reply) -> None:
         if not wanted():
             return
-        url = reply.content.camera_url if isinstance(reply.content, m.SensorInfo) else ""
+        info = reply.content if isinstance(reply.content, m.SensorInfo) else m.SensorInfo("")
+        url = info.camera_url
+        offered(info.sensors)
         found = topic(url)
         if found is None:
             blind(url)

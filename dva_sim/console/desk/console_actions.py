@@ -12,6 +12,7 @@ from dva_sim.console.driving.decision_actions import DecisionActions
 from dva_sim.console.driving.desk_actions import DeskActions, instructions_of
 from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
 from dva_sim.console.driving.mission_actions import MissionActions
+from dva_sim.console.driving.seat_sensors import SensorActions
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import LogsLooked, PagesHere, RobotsWatched
@@ -45,7 +46,8 @@ class ConsoleActions:
         )
         server = ServerActions(pages.system.bench)
         missions = MissionActions(pages.driven, pages.rooms, driving)
-        holders = self, driving, decisions, desk, missions, alarms, pages.fakes, server
+        sensors = SensorActions(pages.seat_sensors, driving)
+        holders = self, driving, decisions, desk, missions, sensors, alarms, pages.fakes, server
         dispatcher = ActionDispatcher(
             place,
             holders=(*holders, *self.holders(driving)),

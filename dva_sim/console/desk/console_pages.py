@@ -13,6 +13,7 @@ from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.driving.decision_actions import DecidingRooms
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seat_lines import SeatLines
+from dva_sim.console.driving.seat_sensors import SeatSensors
 from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.dva.fake_devices import FakeDevices
 from dva_sim.console.events.alarms import AlarmCondition
@@ -85,6 +86,7 @@ class ConsolePages:
         users: Names of those who have logged in, by client.
         alarms: Alarms that need action.
         sensors: Sensors of robots from outside that somebody looks at.
+        seat_sensors: Sensors that drivers read of the robots in their hands.
         audited: Keeps who did what; None: nobody does.
         lag: Rule that holds drives while what runs here lags; nothing runs at a remote DVA's.
     """
@@ -118,7 +120,8 @@ class ConsolePages:
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.alarms = ConsoleAlarms(system.agent, system.named, breaches)
         self.audited: Audited | None = None
-        self.seat_lines = SeatLines(driven, phones)
+        self.seat_sensors = SeatSensors(driven.alarm_at)
+        self.seat_lines = SeatLines(driven, phones, self.seat_sensors)
         self._news = News(lambda: self.tell)
         self._events: list[SiteEventShown] = []
         self._hearing: Hearing = "never"
@@ -148,6 +151,7 @@ class ConsolePages:
         clock.pulse(NEWS, self._tell_news)
         clock.pulse(DEVICES, self._tell_devices)
         clock.pulse(DEVICES, self.sensors.go_on)
+        clock.pulse(DEVICES, self.seat_sensors.tidy)
 
     # --- pages and their people ------------------------------------------------------------
 

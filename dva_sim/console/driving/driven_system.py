@@ -106,6 +106,10 @@ class DrivenSystem:
         """Return the name of the pattern by which a robot is driven next, or now."""
         return self._patterns.get(robot, self.own_pattern)
 
+    def alarm_at(self, _: str) -> float | None:
+        """Return the value from which on a sensor gives the alarm; no message tells it."""
+        return None
+
     def reach(self, _: str) -> Reach:
         """Return the limits of a robot; no message tells them."""
         return REACH

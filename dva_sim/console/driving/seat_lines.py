@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from dva_sim.agents.operator.held_robot import REVOKED, HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.driving.driven_system import DrivenSystem
+from dva_sim.console.driving.seat_sensors import SeatSensors
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.scenes import OrderShown
 from dva_sim.console.wire.seats import DriveShown, InputHeard, MissionShown, PhoneShown, SeatLine
@@ -38,13 +39,17 @@ class SeatLines:
     Args:
         system: System whose robots are driven.
         phones: By their clients.
+        sensors: Sensors of robots in hand.
     """
 
-    def __init__(self, system: DrivenSystem, phones: Mapping[str, PhoneSeat]) -> None:
+    def __init__(
+        self, system: DrivenSystem, phones: Mapping[str, PhoneSeat], sensors: SeatSensors
+    ) -> None:
         self._system = system
         self._persons = system.seating.persons
         self._client_of = system.seating.client_of
         self._phones = phones
+        self._sensors = sensors
         self._acted: dict[str, ActedInput] = {}  # of the newest command in force, by robot
 
     def applied(self, drive: DriveLog) -> None:
@@ -144,6 +149,7 @@ class SeatLines:
             "i": system.number_of(held.robot),
             "level": held.level,
             "mission": _mission_shown(held),
+            "sensors": self._sensors.lines(held),
             "pattern": system.pattern_of(held.robot),
             "phase": held.phase,
             "mode": system.mode_of(held.robot),

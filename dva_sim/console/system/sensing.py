@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Final
 
-from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.console.system.system_state import DeviceState, SystemState
@@ -24,13 +23,32 @@ class SensorWatch:
 
     Args:
         device: Device that subscribes.
-        device_state: State of the robot, which takes the values.
+        robot: Id of the robot.
+        names: Names of the sensors.
+        rate_hz: Desired rate of values [Hz].
+        heard: Callback for each value.
+        told: Callback for the DVA's first answer: whether it permits that, and why not.
+
+    Attributes:
+        names: Names of the sensors, of which those that are permitted are read.
     """
 
-    def __init__(self, device: AgentDevice, device_state: DeviceState) -> None:
+    def __init__(
+        self,
+        device: AgentDevice,
+        robot: str,
+        names: Sequence[str],
+        rate_hz: float,
+        *,
+        heard: Callable[[m.SensorValue], object],
+        told: Callable[[bool, str], object] | None = None,
+    ) -> None:
         self._device = device
-        self._state = device_state
-        self._robot = device_state.device.id_tag
+        self._robot = robot
+        self.names = tuple(names[:MOST_SENSORS])
+        self._rate_hz = rate_hz
+        self._on_value = heard
+        self._told = told or do_nothing
         self._session: int | None = None
         self._over = False
         self._subscriptions: dict[str, Subscription] = {}
@@ -44,7 +62,6 @@ class SensorWatch:
             if self._session is not None:
                 self._device.ask(self._robot, m.DevSub(name, 0.0), session=self._session)
         self._subscriptions.clear()
-        self._state.values.clear()
         if self._session is not None:
             give_back(self._device, self._robot, self._session)
 
@@ -52,23 +69,35 @@ class SensorWatch:
         """Ask for the permission; if there is none, again after a while."""
         if self._over:
             return
-        names = tuple(sensor.name for sensor in self._state.sensors[:MOST_SENSORS])
-        wish = m.PermissionRequest(self._robot, "sensors", names)
-        self._device.ask(self._device.dva, wish, partial(self._answered, names), self._ask_later)
+        wish = m.PermissionRequest(self._robot, "sensors", self.names)
+        self._device.ask(self._device.dva, wish, self._answered, self._unanswered)
 
-    def _ask_later(self, *_: object) -> None:
+    def _unanswered(self) -> None:
+        self._tell(False, "the DVA does not answer")
+        self._ask_later()
+
+    def _tell(self, ok: bool, text: str) -> None:
+        told = self._told
+        self._told = do_nothing
+        told(ok, text)
+
+    def _ask_later(self) -> None:
         self._device.clock.call_after(RENEW, self._ask)
 
-    def _answered(self, names: tuple[str, ...], reply: m.Reply) -> None:
+    def _answered(self, reply: m.Reply) -> None:
         permission = reply.content
         if not isinstance(permission, m.Permission):
+            self._tell(False, reply.text)
             self._ask_later()
             return
         self._session = permission.session
         if self._over:
             give_back(self._device, self._robot, self._session)
             return
-        for name in permission.sensors or names:
+        permitted = permission.sensors or self.names
+        withheld = ", ".join(name for name in self.names if name not in permitted)
+        self._tell(not withheld, f"you may not read {withheld}" if withheld else "")
+        for name in permitted:
             self._listen(name)
             self._subscribe(name)
         self._ask_later()  # which renews all of it
@@ -76,11 +105,11 @@ class SensorWatch:
     def _subscribe(self, name: str) -> None:
         """The robot may not know of the permission yet."""
         start(
-            *(self._device, self._robot, m.DevSub(name, FREQUENCY), lambda: self._session or 0),
+            *(self._device, self._robot, m.DevSub(name, self._rate_hz), lambda: self._session or 0),
             wanted=lambda: not self._over,
-            begun=_nothing,
-            refused=_nothing,
-            lost=_nothing,
+            begun=do_nothing,
+            refused=do_nothing,
+            lost=do_nothing,
         )
 
     def _listen(self, name: str) -> None:
@@ -94,7 +123,7 @@ class SensorWatch:
     def _heard(self, data: bytes) -> None:
         message = self._device.read(data, self._robot)
         if message is not None and isinstance(message.body, m.SensorValue):
-            self._state.values[message.body.sensor] = message.body, self._device.clock.now
+            self._on_value(message.body)
 
 
 class WatchedSensors:
@@ -127,10 +156,16 @@ class WatchedSensors:
         wanted = [id_tag for id_tag in looked if id_tag and not known[id_tag].is_own]
         for id_tag in [one for one in self._watches if one not in wanted]:
             self._watches.pop(id_tag).end()
+            if id_tag in known:
+                known[id_tag].values.clear()
         for id_tag in wanted:
             if id_tag not in self._watches and known[id_tag].sensors:
-                self._watches[id_tag] = SensorWatch(self._device, known[id_tag])
+                self._watches[id_tag] = self._watch(known[id_tag])
 
+    def _watch(self, device_state: DeviceState) -> SensorWatch:
+        def heard(value: m.SensorValue) -> None:
+            device_state.values[value.sensor] = value, self._device.clock.now
 
-def _nothing(*_: object) -> None:
-    """Without values a sensor is shown as unknown, and it is asked again."""
+        names = [sensor.name for sensor in device_state.sensors]
+        robot = device_state.device.id_tag
+        return SensorWatch(self._device, robot, names, FREQUENCY, heard=heard)

@@ -52,6 +52,7 @@ from dva_sim.console.wire.arguments import (
     RobotsWatched,
     RoomName,
     SampleBatch,
+    SensorsChosen,
     ShelveAsked,
     TakeAsked,
     TakeOffAsked,
@@ -242,6 +243,14 @@ _LIST = (
         "has a robot that one holds go by itself",
         MissionOrdered,
         at=_RUN,
+        over_link=True,
+    ),
+    Action(
+        "sense",
+        "reads sensors of a robot that one holds",
+        SensorsChosen,
+        at=_RUN,
+        audit=_LOOKS,
         over_link=True,
     ),
     Action(

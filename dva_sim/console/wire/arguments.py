@@ -42,6 +42,7 @@ STEPS: Final = (0.001, 100.0)  # of a phone's calibration [m/s^2]
 DELAYS: Final = (0.02, 5.0)  # of a phone, at most [s]
 LONGEST_LEG: Final = 3600.0  # of the tour [s]
 FAR: Final = 1e6  # of the origin: no site is so large [m]
+SENSOR_RATES: Final = (0.02, 20.0)  # of the values of a robot [Hz]
 SHIFT: Final = 8 * 3600  # no alarm is shelved for longer [s]
 
 Axes = Annotated[list[Annotated[float, Number(-MOST_MPS2, MOST_MPS2)]], Several(3, 3)]
@@ -299,6 +300,13 @@ class MissionOrdered(OfRobot):
     what: Literal["go_to", "patrol", "inspect", "return_to_base"]
     places_m: NotRequired[Places]
     event: NotRequired[EventNumber]
+
+
+class SensorsChosen(OfRobot):
+    """Sensors of a robot that one holds, and how often they are read."""
+
+    sensors: Annotated[list[Name], Several(0, 16)]
+    rate_hz: Annotated[float, Number(*SENSOR_RATES)]
 
 
 class FindingAsked(OfEvent):

@@ -1,6 +1,6 @@
 """Lines for people in seats: their drives, phones and guards; and answers to actions."""
 
-from typing import Final, Literal
+from typing import Final, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -23,12 +23,25 @@ class MissionShown(TypedDict):
     reason: str
 
 
+class SensedShown(TypedDict):
+    """A sensor of a robot in hand, with its values or the least of many while it is read."""
+
+    name: str
+    unit: str
+    rate_hz: float | None
+    age_s: float | None
+    alarm_at: float | None
+    values: NotRequired[list[float]]
+    least: NotRequired[float]
+
+
 class DriveShown(TypedDict):
     """A robot in somebody's hands."""
 
     i: int | None
     level: str
     mission: MissionShown | None
+    sensors: list[SensedShown]
     pattern: str
     phase: str
     mode: str

@@ -16,7 +16,7 @@ from dva_sim.console.driving.seating import Seating
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.system.known_system import KnownSystem
-from dva_sim.simulation.full.control_room import console_of
+from dva_sim.simulation.full.control_room import SENSOR_ALARMS, console_of
 from dva_sim.simulation.full.run import Run
 
 PEOPLE: Final = 1  # operators of the scenario whose places people take
@@ -95,6 +95,11 @@ class DrivenRun(DrivenSystem):
     @override
     def pattern_of(self, robot: str) -> str:
         return self._run.stage.pattern_name(robot)
+
+    @override
+    def alarm_at(self, sensor: str) -> float | None:
+        alarm = SENSOR_ALARMS.get(sensor)
+        return None if alarm is None else alarm.threshold
 
     @override
     def reach(self, robot: str) -> Reach:

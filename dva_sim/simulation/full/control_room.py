@@ -130,7 +130,7 @@ def make_core(stage: Stage, permissions: Permissions, number: int = 1, life: int
         ground=_ground(stage) if policy.relocates else SiteKnowledge(),
         access=Access(rules) if rules else Access(),
         patrols=_patrols(stage),
-        sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
+        sensing=Sensing({n: SENSOR_ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
         supervisors=frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors),
         roles=Roles(control_rooms_of(stage.scenario)),
         ask_first=dispatch.mode == "ask_first",
@@ -153,7 +153,7 @@ def _division(stage: Stage, own: str, life: int) -> Division:
     )
 
 
-_ALARMS = {
+SENSOR_ALARMS = {
     "temperature": SensorAlarm("fire", HEAT_ALARM),
     "smoke": SensorAlarm("fire", SMOKE_ALARM),
     "gas": SensorAlarm("gas_leak", GAS_ALARM * min(gas.lower for gas in GASES.values())),

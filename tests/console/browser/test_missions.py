@@ -73,3 +73,32 @@ def test_the_driving_page_sends_a_robot_to_an_event_and_back(running, visit):
     expect(progress(page)).to_have_text("Done.")
     page.get_by_role("button", name="Release control").click()
     expect(page.get_by_role("region", name="Missions")).to_have_count(0)
+
+
+def test_sensors_are_read_while_driving_beside_the_picture(hand):
+    page = hand.page
+    hand.drive()
+    page.get_by_text("Choose sensors").tap()
+    page.get_by_label("Temperature", exact=True).check()
+    page.get_by_label("Frequency").select_option("2")
+    page.get_by_text("Choose sensors").tap()
+    value = page.get_by_role("region", name="Sensors of robot-1").get_by_role("listitem")
+    expect(value).to_contain_text("°C")
+    expect(value).to_contain_text("s old, alarm from 58 °C")
+    assert hand.sent("sense")[-1]["rate_hz"] == 2
+    picture, shown = page.locator(".surface").bounding_box(), value.bounding_box()
+    assert picture
+    assert shown
+    assert picture["y"] + picture["height"] <= shown["y"]
+    hand.is_driving()
+
+
+def test_the_driving_page_reads_sensors_of_a_robot_in_hand(running, visit):
+    page = visit.open(running.drive, "drive")
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_text("Choose sensors").click()
+    page.get_by_label("Smoke", exact=True).check()
+    region = page.get_by_role("region", name="Sensors of robot-1")
+    expect(region.get_by_role("listitem")).to_contain_text("alarm from")
+    page.get_by_role("button", name="Release control").click()
+    expect(region).to_have_count(0)

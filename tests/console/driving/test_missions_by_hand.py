@@ -86,7 +86,7 @@ def test_what_cannot_be_ordered_is_refused_in_words(page, level, asked, why):
 
 
 def test_the_dva_refuses_missions_of_a_robot_to_whom_the_rules_give_none(monkeypatch):
-    rules = [{"holders": ["*"], "robots": ["robot-1"], "levels": ["teleoperation"]}]
+    rules = [{"robots": ["robot-1"], "levels": ["teleoperation"]}]
     page = PhonePage(monkeypatch, access=rules)
     page.register()
     done = page.permit(level="missions")

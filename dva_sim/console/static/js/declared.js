@@ -13,6 +13,7 @@ export const PATIENCE_MS = {
  "refute": 65000,
  "decline": 10000,
  "mission_order": 65000,
+ "sense": 65000,
  "mission_cancel": 65000,
  "tour": 10000,
  "tour_time": 10000,

@@ -279,17 +279,22 @@
  * @typedef {{state: string, places_left: number, reason: string}} Mission
  */
 /**
+ * A sensor of a robot in hand, with its values or the least of many while it is read.
+ * @typedef {{name: string, unit: string, rate_hz: number | null, age_s: number | null,
+ *   alarm_at: number | null, values?: number[], least?: number}} Sensed
+ */
+/**
  * The input behind the newest command that took effect.
  * @typedef {{n: number, at_ms: number}} InputHeard
  */
 /**
  * A robot in somebody's hands.
- * @typedef {{i: number | null, level: string, mission: Mission | null, pattern: string,
- *   phase: string, mode: string, session: number | null, wanted: number[], command: number[],
- *   command_age_ms: number | null, picture_ms: number | null, picture_arrived_ms: number | null,
- *   silent_s: number | null, loop_ms: number | null, input: InputHeard | null, sent: number,
- *   answered: number, timeouts: number, refused: number, superseded: number, round_trip_ms: number
- *   | null, outcome: string | null}} Drive
+ * @typedef {{i: number | null, level: string, mission: Mission | null, sensors: Sensed[],
+ *   pattern: string, phase: string, mode: string, session: number | null, wanted: number[],
+ *   command: number[], command_age_ms: number | null, picture_ms: number | null,
+ *   picture_arrived_ms: number | null, silent_s: number | null, loop_ms: number | null,
+ *   input: InputHeard | null, sent: number, answered: number, timeouts: number, refused: number,
+ *   superseded: number, round_trip_ms: number | null, outcome: string | null}} Drive
  */
 /**
  * A phone in somebody's hand.

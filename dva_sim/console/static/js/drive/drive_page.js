@@ -1,6 +1,6 @@
 /** Driving page: one or two robots with their pictures, the map and latencies. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { connection, seat, scene } from '../store.js';
+import { connection, driveOf, seat, scene } from '../store.js';
 import { driveLost } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { LinkPanel } from '../network/link_panel.js';
@@ -16,6 +16,7 @@ import { driveByKeys } from './keys.js';
 import { Latency } from './latency.js';
 import { OrderInHand } from './order.js';
 import { RobotHead } from './robot_head.js';
+import { Sensing } from './sensing.js';
 
 /** The page. */
 export function DrivePage() {
@@ -29,6 +30,7 @@ export function DrivePage() {
   useEffect(() => {
     if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
   }, [connection.value, driveLost.value]);
+  const read = robots.filter((robot) => seat.value && driveOf(robot.i)?.sensors.length);
   const goers = robots.filter((robot) => seat.value && hasMissions(robot.i));
   const two = robots.length > 1;
   return html`<main class=${two ? 'page drive-page two' : 'page drive-page'} id="main" tabindex="-1">
@@ -46,6 +48,7 @@ export function DrivePage() {
         onPlace=${goers.length ? place : undefined} />
     </section>
     <div class="side"><${Alert} /><${OrderInHand} /><${Controls} robots=${robots} />
+      ${read.map((robot) => html`<div class="panel" key=${robot.i}><h2>Sensors of ${robot.label}</h2><${Sensing} robot=${robot} /></div>`)}
       ${goers.map((robot) => html`<${Missions} key=${robot.i} robot=${robot} />`)}<${LinkPanel} /></div>
     <${Latency} robots=${robots} />
   </main>`;

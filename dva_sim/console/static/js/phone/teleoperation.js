@@ -8,6 +8,7 @@ import { CameraPicture } from '../drive/camera.js';
 import { pictureAge } from '../drive/drawn.js';
 import { driveByGamepad } from '../drive/gamepad.js';
 import { driveByKeys } from '../drive/keys.js';
+import { Sensing } from '../drive/sensing.js';
 import { Stick } from '../drive/stick.js';
 import { useEvery } from '../ui/every.js';
 import { msText, plain } from '../ui/words.js';
@@ -45,6 +46,7 @@ function Cockpit({ one }) {
     <div class="surface" ...${handlers}>${one.i >= 0 && html`<${CameraPicture} robot=${one} />`}</div>
     <${Figures} one=${one} />
     <${Order} />
+    ${one.i >= 0 && html`<${Sensing} robot=${one} />`}
     <div class="below">
       <p class="hint" role="status" aria-label="Doing"><${Hint} one=${one} /></p>
       ${!tilts.value && html`<div class="stick-box"><${Stick} disabled=${!maySteer.value} /></div>`}
