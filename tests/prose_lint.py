@@ -22,6 +22,10 @@ OPENINGS = {
     "fragment": re.compile(r"(Of|That|As|The same)\b"),
     "see": re.compile(r"See `[^`]*`[.;]"),
 }
+NO_VERB = re.compile(
+    r"(A|All|An|Another|Any|At|Both|By|Each|Every|Everybody|Everything|False|For|From|In|It|Its|No"
+    r"|Nobody|Nothing|On|One|Others|So|Some|Somebody|Something|The|There|Those|True|With|Without)\b"
+)
 WORDS = re.compile(
     r"\b(luck|anew|whoever|(?:is|are) told|gone on with|goes on with|shall|(?:is|are) no"
     r"(?= [a-z]+[^a-z ]))\b",
@@ -46,7 +50,10 @@ class Finding(NamedTuple):
 
 def findings_in(source: str, path: Path) -> Iterator[Finding]:
     """All findings in the docstrings of a Python file, or the doc comments of a JavaScript file."""
-    docs = _comments(source) if path.suffix == ".js" else _docstrings(ast.parse(source))
+    is_python = path.suffix == ".py"
+    if is_python and path.parts[0] == "dva_sim":
+        yield from _verbless(ast.parse(source), path)
+    docs = _docstrings(ast.parse(source)) if is_python else _comments(source)
     for line, text in docs:
         place = f"{path}:{line}"
         summary = text.partition("\n")[0]
@@ -57,6 +64,16 @@ def findings_in(source: str, path: Path) -> Iterator[Finding]:
             yield Finding("word", place, word[0])
         for argument in ARGUMENT.finditer(text):
             yield Finding("argument", place, argument[0].strip())
+
+
+def _verbless(tree: ast.Module, path: Path) -> Iterator[Finding]:
+    """Functions, but for properties, whose summary does not begin with a verb."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            summary = (ast.get_docstring(node) or "").partition("\n")[0]
+            decorators = {ast.unparse(each).split(".")[-1] for each in node.decorator_list}
+            if NO_VERB.match(summary) and not decorators & {"property", "cached_property"}:
+                yield Finding("verb", f"{path}:{node.lineno}", summary)
 
 
 def _docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:

@@ -32,7 +32,7 @@ def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
 
 
 def plugins_as_json() -> dict[str, Any]:
-    """Each kind with its key, its group of entry points, its class, and what there is of it."""
+    """Return each kind with its key, group of entry points, class, and what there is of it."""
     return {
         several: {
             "key": plugins.key,

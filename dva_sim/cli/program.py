@@ -54,7 +54,7 @@ _BOUNDS = {
 
 
 def _plain(message: str) -> str:
-    """The parser library's bounds on a number in plain words."""
+    """Return the parser library's bounds on a number in plain words."""
     for theirs, ours in _BOUNDS.items():
         message = message.replace(f"Input should be {theirs}", f"should be {ours}")
     return message
@@ -173,7 +173,7 @@ def _program(
         ),
     ] = False,
 ) -> None:
-    """A test bench for surveillance teams of people and teleoperated robots."""
+    """Test surveillance teams of people and teleoperated robots."""
 
 
 app = typer_of(DvaSimProgram, add_completion=True)

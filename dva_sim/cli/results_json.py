@@ -120,7 +120,7 @@ def _finding(reading: Reading) -> Data | None:
 
 
 def _cells(reading: Reading) -> Iterator[Data]:
-    """Every cell with its mean of the answer's measure, over persons, and its 95 % interval."""
+    """Return every cell with its mean of the answer's measure over persons and its interval."""
     view = reading.view
     if view is None:
         return

@@ -60,7 +60,7 @@ def export(
 
 
 def _open(name: str, changes: Sequence[str]) -> Site:
-    """A site by name or path, or that of a ROS map.
+    """Return a site by name or path, or that of a ROS map.
 
     Raises:
         ConfigError: it cannot be read, or takes no options.

@@ -235,7 +235,7 @@ class Dva:
         return self._with_revocations(self.orders.again())
 
     def dismiss(self, device: str, now: float) -> list[Send]:
-        """A device is to be there no more: what it held is free, and it is forgotten at once."""
+        """Drop a device: what it held is free, and it is forgotten at once."""
         if device not in self.registry.entries:
             return []
         sends = self._gone(device, now)

@@ -183,7 +183,7 @@ class Registry:
                 del self._alike[look]
 
     def _label_of(self, id_tag: str, label: str) -> str:
-        """The label by which a device is shown, if it is to be this one."""
+        """Return the label by which a device is shown, if it is to be this one."""
         alike = [self.entries[other] for other in self._alike.get(look_of(label), set()) - {id_tag}]
         for entry in alike:
             if entry.silent and entry.device.label == distinct(label, "", ()):
@@ -212,7 +212,7 @@ class Registry:
         entry.position = position
 
     def fallen_silent(self, now: float) -> list[DeviceEntry]:
-        """Devices that have been quiet for longer than the time-out since the last call."""
+        """Return devices that have been quiet for longer than the time-out since the last call."""
         gone = []
         while self.next_silence() <= now:
             id_tag, entry = next(iter(self._heard.items()))
@@ -224,7 +224,7 @@ class Registry:
         return gone
 
     def forget(self, id_tag: str) -> None:
-        """A device was never registered."""
+        """Forget a device as if it had never registered."""
         entry = self.entries.pop(id_tag)
         for known in (self._of_type, self._located):
             known[entry.kind].pop(id_tag, None)
@@ -234,7 +234,7 @@ class Registry:
         self._note(id_tag, None)
 
     def long_silent(self, now: float) -> Iterator[str]:
-        """Devices that could be forgotten by now, the longest silent first."""
+        """Return devices that could be forgotten by now, the longest silent first."""
         until = now - self.forget_after
         return (i for i, _ in takewhile(lambda e: e[1].last_heard < until, self._silent.items()))
 
@@ -251,7 +251,7 @@ class Registry:
         return math.nextafter(longest.last_heard + self.silent_after, math.inf)  # not before
 
     def of_type(self, device_type: str) -> Iterable[DeviceEntry]:
-        """Registered devices of a type that are not silent, in order of registration."""
+        """Return the registered devices of a type that are not silent, in order of registration."""
         return (e for e in self._of_type[device_type].values() if not e.silent)
 
     def device_list(self) -> DeviceList:

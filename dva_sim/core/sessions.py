@@ -166,7 +166,7 @@ class Sessions:
             self._unheard[body.session] = send
 
     def above(self, send: Send, floor: int) -> Send | None:
-        """A robot has refused a grant, and told the highest session it knows: one above that.
+        """Return a session above the highest that a robot knows, which refused a grant.
 
         Its holder hears that the first is over, and asks for the new one. None: that grant holds
         no longer, or no session can be so high; then it is as if it had not arrived.
@@ -201,7 +201,7 @@ class Sessions:
         self._over += [self._unheard.pop(session) for session in there]
 
     def with_something_open(self) -> set[str]:
-        """The robots that somebody holds, or that still have to hear that a session is over."""
+        """Return robots that somebody holds, or that must still hear that a session is over."""
         held = {g.robot for g in self.permissions.all() if g.holder != self.permissions.own}
         return held.union(send.to for send in self.unacknowledged.values())
 

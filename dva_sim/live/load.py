@@ -233,7 +233,7 @@ def check(options: LoadOptions) -> None:
 
 @contextmanager
 def _dva(options: LoadOptions) -> Iterator[tuple[str, LoadedDva]]:
-    """The DVA that was named, or one that is started and ended."""
+    """Yield the DVA that was named, or one that is started and ended."""
     if options.dva is not None:
         yield options.dva, LoadedDva(options.pid)
         return

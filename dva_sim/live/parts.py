@@ -54,7 +54,7 @@ class LivePart(Protocol):
     """Process of a live run."""
 
     def rows(self) -> list[Row]:
-        """One line per device for the table; only what this part knows."""
+        """Return one line per device for the table; only what this part knows."""
 
     def settled(self) -> bool:
         """Return True if, as far as this part knows, nothing more will happen."""
@@ -147,7 +147,7 @@ class DvaPart:
         return [_device_row(booked) for booked in self._table.rows()]
 
     def events(self) -> list[Row]:
-        """The events, as the DVA knows them."""
+        """Return the events, as the DVA knows them."""
         return [{"number": e.number, "kind": e.kind, "state": str(e.state)} for e in self._events()]
 
     def settled(self) -> bool:
@@ -156,7 +156,7 @@ class DvaPart:
         return self._scripted or (events.total > self._settled_before and not events.open)
 
     def _events(self) -> list[Event]:
-        """The last that were closed, and all that are open."""
+        """Return the last that were closed, and all that are open."""
         events = self.agent.core.events
         return [*events.closed.values(), *events.open.values()]
 
@@ -376,7 +376,7 @@ class RosbridgePart:
 def make_part(
     name: str, stage: Stage, options: LiveOptions, number: int, door: OpenPort | None = None
 ) -> LivePart:
-    """The part of that name; `number` says which operator, or which DVA.
+    """Return the part of that name; `number` says which operator, or which DVA.
 
     Raises:
         ConfigError: the scenario has no such operator, or no place for its team.

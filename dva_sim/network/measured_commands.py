@@ -61,7 +61,7 @@ def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
 
 @read_once(lambda path: [path], most=2)
 def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
-    """The runs by the values of some columns. Thousands of drives use one table: it is read once.
+    """Return the runs by values of columns; one table serves thousands of drives, read once.
 
     Args:
         path: The table.

@@ -77,7 +77,7 @@ class Line(Protocol):
         """Count a command that is not sent, since a newer one took its place."""
 
     def code_of(self, reply: bytes) -> int | None:
-        """The code in a reply, see `dva_sim.protocol.messages`; None if it cannot be read."""
+        """Return the code in a reply, see `dva_sim.protocol.messages`; None if unreadable."""
 
     def lost(self, why: str = "") -> None:
         """Alert, as nobody obeys any more, and end the drive."""

@@ -89,7 +89,7 @@ class Poller:
         self._ask.pop(source, None)
 
     def poll(self, wait: float) -> list[Any]:
-        """Those that have something to read, after so long at most [s]; there may be none."""
+        """Return those that have something to read, after so long at most [s]; possibly none."""
         ready = {socket: None for socket in self._ask if has_more(socket)} if self._ask else {}
         found: list[Any] = []
         for key, _ in self._selector.select(0.0 if ready else wait):

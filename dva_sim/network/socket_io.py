@@ -22,7 +22,7 @@ send: Final = zmq.backend.Socket.send
 
 
 def next_of(socket: Socket) -> list[bytes] | None:
-    """The next message; None if all are read, or the last one has led to closing the socket."""
+    """Return the next message; None if all are read, or the last one closed the socket."""
     return None if socket.closed or not has_more(socket) else receive(socket)
 
 

@@ -475,7 +475,7 @@ class SocketNetwork(RealNetwork):
     # --- sockets -----------------------------------------------------------------------
 
     def _socket(self, kind: int, options: Mapping[int, int]) -> Socket:
-        """A socket with these options and those of all: connections made afterwards have them."""
+        """Return a socket with these options and those of all, for later connections."""
         socket = self._context.socket(kind)
         for option, value in {**options, **self._options}.items():
             socket.setsockopt(option, value)

@@ -181,7 +181,7 @@ class AuditLog:
 
 
 def row_of(entry: AuditEntry, number: int, before: str) -> AuditRow:
-    """An entry as the row of that number, after one with that hash."""
+    """Return an entry as the row of that number, after one with that hash."""
     values = {name: _clean(getattr(entry, name)) for name in NAMES}
     values["details"] = json.loads(_packed(values["details"]))
     values["time_s"] = float(values["time_s"])
@@ -190,12 +190,12 @@ def row_of(entry: AuditEntry, number: int, before: str) -> AuditRow:
 
 
 def hash_of(plain: Sequence[Any]) -> str:
-    """The SHA-256 of a row: its columns in their order, as JSON, but for the hash itself."""
+    """Return the SHA-256 of a row: its columns in their order, as JSON, but for the hash itself."""
     return hashlib.sha256(json.dumps(plain, separators=(",", ":")).encode()).hexdigest()
 
 
 def _clean(value: Any) -> Any:
-    """Text that any file can hold: half a character pair is replaced."""
+    """Return the text that any file can hold: half a character pair is replaced."""
     return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
@@ -242,7 +242,7 @@ class Verified:
 
 
 def read_rows(path: Path, after: int = 0, most: int = -1) -> list[AuditRow]:
-    """The rows after a number, as they stand in the file.
+    """Return the rows after a number, as they stand in the file.
 
     Raises:
         ConfigError: the file holds none, or what no log writes.
@@ -333,7 +333,7 @@ def _doubts(file: sqlite3.Connection, last: str) -> Iterator[str]:
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    """The file, to be read only; nothing else opens it, since that would end SQLite's locks.
+    """Return the file, to be read only; nothing else opens it, since that would end SQLite's locks.
 
     Raises:
         ConfigError: it cannot be opened.
@@ -364,5 +364,5 @@ def _row(values: Sequence[Any]) -> AuditRow:
 
 
 def plain_row(row: AuditRow) -> dict[str, Any]:
-    """A row as a dictionary, in the order of the columns."""
+    """Return a row as a dictionary, in the order of the columns."""
     return {name: getattr(row, name) for name in COLUMNS}

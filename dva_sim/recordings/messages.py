@@ -46,7 +46,7 @@ def stamped(time: float, topic: str, schema: str, **content: Any) -> ChannelMess
 
 
 def nanoseconds(time: float) -> int:
-    """A moment of virtual time [s] in nanoseconds, to the microsecond that the clock keeps."""
+    """Return virtual time [s] in nanoseconds, to the microsecond that the clock keeps."""
     return round(time * 1e6) * 1000
 
 
@@ -113,7 +113,7 @@ _WORDS: dict[str, Schema] = {
 
 
 def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
-    """The types of a text by their full names, and with what is known by their last words."""
+    """Return the types of a text by full names, and by their last words where known."""
     types: dict[str, Schema] = {}
     for paragraph in text.strip().split("\n\n"):
         head, _, body = paragraph.partition("\n")

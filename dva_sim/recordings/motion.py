@@ -117,11 +117,11 @@ class MotionWriter:
             self._write(line)
 
     def app(self, app: MotionApp) -> None:
-        """Another app takes the samples from now on."""
+        """Let another app take the samples from now on."""
         self._write(app.line())
 
     def sample(self, sample: MotionSample) -> None:
-        """One more."""
+        """Write one more sample."""
         if not self._begun:
             self._begun = True
             self._first = sample.stamp
@@ -130,7 +130,7 @@ class MotionWriter:
         self._write(",".join(map(repr, numbers)) + f",{sample.orientation}")
 
     def close(self) -> None:
-        """It is complete."""
+        """Complete the file."""
         self._file.close()
 
     def _write(self, line: str) -> None:
@@ -196,7 +196,7 @@ def _app(content: dict[str, Any]) -> MotionApp:
 def replayed(
     motion: PhoneMotion, looks: Iterator[float] | None = None, rate_hz: float = 10.0
 ) -> Iterator[tuple[float, TiltCommand]]:
-    """The commands that the apps of a file make of its samples, with their times [s].
+    """Yield the commands that the apps of a file make of its samples, with their times [s].
 
     Args:
         motion: Content of the file.

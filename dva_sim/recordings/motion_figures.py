@@ -92,7 +92,7 @@ def _noise(samples: list[MotionSample]) -> float:
 
 
 def _resolution(samples: list[MotionSample]) -> float:
-    """Smallest step along an axis [m/s^2]; what is smaller than rounding is none."""
+    """Return the smallest step along an axis [m/s^2]; what is smaller than rounding is none."""
     smallest = math.inf
     for axis in zip(*(sample.xyz for sample in samples), strict=True):
         levels = sorted(set(axis))
@@ -102,7 +102,7 @@ def _resolution(samples: list[MotionSample]) -> float:
 
 
 def part_of(figures: MotionFigures) -> dict[str, Any]:
-    """An accelerometer part that measures as this one did; for `phone.accelerometer`."""
+    """Return an accelerometer part that measures as this one did; for `phone.accelerometer`."""
     return {
         "description": f"Measured: a phone's own part, by {figures.samples} samples of its motion.",
         "data_sheet": "none: by the differences of neighbouring samples at rest",

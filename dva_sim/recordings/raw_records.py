@@ -39,7 +39,7 @@ class _Exactly:
         file.seek(0)
 
     def read(self, length: int) -> bytes:
-        """The next bytes; no memory is taken for more than there are."""
+        """Return the next bytes; no memory is taken for more than there are."""
         from mcap.exceptions import EndOfFile
 
         self._left -= length

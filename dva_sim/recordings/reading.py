@@ -77,7 +77,7 @@ class RecordedHazard(Hazard):
 
 
 def recorded_hazard(number: int, entry: Mapping[str, Any], records: Records) -> Hazard:
-    """The stand-in for a hazard.
+    """Return the stand-in for a hazard.
 
     Args:
         number: Number of its incident, from 1.
@@ -307,7 +307,7 @@ def _event(entry: Mapping[str, Any]) -> Event:
 def _surroundings(
     raw: RawRecords, site: Site, incidents: list[RunHazard], contained: dict[int, float]
 ) -> Surroundings:
-    """The fields of the hazards: solved again, but with a hazard that is not ours as recorded."""
+    """Return the hazards' fields: solved again, but for foreign hazards, as recorded."""
     real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
     hazards = [incidents[number].hazard for number in real]
     if any(isinstance(hazard, RecordedHazard) for hazard in hazards):
@@ -354,7 +354,7 @@ def _point(time: float, content: Mapping[str, Any], mode: str) -> TrackPoint:
 def _track(
     contents: list[tuple[float, Any]], modes: list[tuple[float, Any]], period: float, end: float
 ) -> list[TrackPoint]:
-    """The samples of a track as they were taken, with those left out of somebody who stands."""
+    """Return the samples of a track as taken, with those left out while somebody stands."""
     track: list[TrackPoint] = []
     turns = iter([*modes, (inf, {"activity": ""})])
     mode = ""

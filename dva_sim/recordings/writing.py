@@ -43,7 +43,7 @@ NO_SITE = "its site is missing"
 
 
 def pack(site: Site) -> dict[str, bytes]:
-    """The files of a site by name: YAML and GeoJSON of a plan, YAML and PNG of a bare map."""
+    """Return a site's files by name: YAML and GeoJSON of a plan, YAML and PNG of a bare map."""
     if not site.rooms:
         return _map_files(site)
     with TemporaryDirectory() as folder:

@@ -74,7 +74,7 @@ def _keys() -> dict[str, Key]:
 
 @cache
 def _measures() -> dict[str, Measure]:
-    """Every column by name; where models have one each, that of the first that says a title."""
+    """Return every column by name; of several models' that of the first with a title."""
     values: dict[str, Measure] = {}
     tables = [table for model in MODELS.values() for table in model.columns.values()]
     for column in itertools.chain(*tables):

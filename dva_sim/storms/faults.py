@@ -477,7 +477,7 @@ def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _flood_in_doubt(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """An intruder orders a robot about so many times a second, and the DVA does not hear of it."""
+    """Order a robot about as an intruder so many times a second, unheard by the DVA."""
     robot = storm.id_of(fault.target)
     goes = [True]
     rules = storm.interference.rules

@@ -101,7 +101,7 @@ def notes(kind: FileKind, document: Document) -> str:
 
 
 def _without_a_place(document: Document) -> Iterator[str]:
-    """Yield the say of a map in how many runs no event finds a place."""
+    """Say of a map in how many runs no event finds a place."""
     scenario = scenarios.load(PROBE)
     model = model_of(scenario)
     problems = list[str]()

@@ -175,7 +175,7 @@ class Ticks:
         self._awake: dict[Body, None] = {}  # a set that keeps its order
 
     def wake(self, body: Body) -> None:
-        """A body was asked for something, or was touched: it is pushed from the next tick on."""
+        """Wake a body that was asked for something, or touched: it is pushed from the next tick."""
         self._awake[body] = None
 
     def forget(self, body: Body) -> None:

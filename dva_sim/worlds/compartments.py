@@ -42,7 +42,7 @@ def of_rooms(
     walls: Floats,
     ways: Sequence[tuple[Sequence[float], float, str]],
 ) -> FloorPartition:
-    """One compartment for each room that is not outdoors.
+    """Return one compartment for each room that is not outdoors.
 
     Args:
         grid: Grid of the cells.
@@ -70,7 +70,7 @@ def _enclosed(ring: Floats) -> float:
 def _passage(
     rooms: Lookup[Room], ends: Sequence[float], height: float, kind: str
 ) -> Iterator[Opening]:
-    """A door with the rooms on both sides; none if it joins a room to itself."""
+    """Yield a door with the rooms on both sides; none if it joins a room to itself."""
     x1, y1, x2, y2 = ends
     width = math.hypot(x2 - x1, y2 - y1)
     x = (x1 + x2) / 2
@@ -90,7 +90,7 @@ def _passage(
 def _borders(
     rooms: Sequence[Room], walls: Floats, doors: Sequence[Sequence[float]]
 ) -> Iterator[Opening]:
-    """Straight pieces of border between two rooms without a wall or a door."""
+    """Yield straight pieces of border between two rooms without a wall or a door."""
     areas = [room.area for room in rooms]
     lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
     barriers = [shapely.LineString(line).buffer(NEAR) for line in lines]
@@ -112,7 +112,7 @@ def _borders(
 
 
 def _straight(lines: Any) -> Floats:
-    """The straight pieces of some lines, `(n, 4)` [m]."""
+    """Return the straight pieces of some lines, `(n, 4)` [m]."""
     parts = [part for part in shapely.get_parts(lines) if part.geom_type == "LineString"]
     if not parts:
         return np.empty((0, 4))
@@ -121,7 +121,7 @@ def _straight(lines: Any) -> Floats:
 
 
 def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, float]:
-    """An opening lengthened where it was cut `NEAR` a wall."""
+    """Return an opening lengthened where it was cut `NEAR` a wall."""
     a = np.array(ends[:2])
     b = np.array(ends[2:])
     along = (b - a) / np.hypot(*(b - a)) * NEAR
@@ -133,7 +133,7 @@ def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, flo
 
 
 def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
-    """Compartment of each cell."""
+    """Return the compartment of each cell."""
     labels = np.full(grid.cells.shape, NOWHERE, np.int16)
     for number, room in reversed(list(enumerate(rooms))):
         window = grid.window(room.polygon)
@@ -143,7 +143,7 @@ def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
 
 # --- bare maps -------------------------------------------------------------------------
 def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
-    """Blocks of a floor without rooms, about `BLOCK` wide, parted where a wall parts them.
+    """Return blocks of a floor without rooms, about `BLOCK` wide, parted where a wall parts them.
 
     Args:
         grid: Grid of the cells.
@@ -159,7 +159,7 @@ def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
 
 
 def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
-    """Connected parts of the floor within each block of a lattice."""
+    """Return the connected parts of the floor within each block of a lattice."""
     from scipy.ndimage import label  # late: start-up
 
     labels = np.full(floor.shape, NOWHERE, np.int16)
@@ -211,7 +211,7 @@ def _borders_between(labels: Labels, count: int) -> NDArray[np.int64]:
 
 
 def _seams(grid: OccupancyGrid, labels: Labels, blocks: Sequence[Compartment]) -> Iterator[Opening]:
-    """Each straight run of cell edges between the same two blocks."""
+    """Yield each straight run of cell edges between the same two blocks."""
     for turned, cells in ((False, labels), (True, labels.T)):
         low = cells[:-1].astype(np.int64)
         high = cells[1:].astype(np.int64)

@@ -194,7 +194,7 @@ def _open_walls(
 
 
 def _rims(rooms: tuple[Room, ...], drawn: Any) -> Iterator[Any]:
-    """The rims of holes in the floor, where nothing else is drawn in them: nobody drives in."""
+    """Return rims of holes in the floor where nothing else is drawn: nobody drives in."""
     for hole in (hole for room in rooms for hole in room.holes):
         bare: Any = shapely.difference(shapely.Polygon(hole), drawn)
         if bare.area > LEAST_HOLE:

@@ -269,7 +269,7 @@ def _collection(path: Path, text: str) -> dict[str, Any]:
 
 
 def _crs(collection: Mapping[str, Any]) -> str:
-    """The coordinate reference system that a file names, as before RFC 7946; empty if none."""
+    """Return the coordinate reference system that a file names; empty after RFC 7946."""
     try:
         return str(collection["crs"]["properties"]["name"])
     except (KeyError, TypeError):
@@ -296,7 +296,7 @@ def _place(text: str, index: int) -> int:
 
 
 def _parts(data: Any, frame: GeoFrame, crs: str, fail: Fail) -> Iterator[Feature]:
-    """A feature of the file; where its kind needs no name of its own, its parts one by one."""
+    """Yield a feature of the file; its parts one by one where its kind needs no name."""
     if not isinstance(data, dict):
         raise fail("should be a GeoJSON Feature, an object")
     properties = data.get("properties")

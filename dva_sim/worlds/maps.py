@@ -52,7 +52,7 @@ class OccupancyGrid:
     cells: NDArray[np.uint8]
 
     def to_cell(self, x: float, y: float) -> tuple[int, int]:
-        """Row and column of a point [m]; may lie outside of the grid."""
+        """Return the row and column of a point [m]; may lie outside of the grid."""
         dx = x - self.origin.x
         dy = y - self.origin.y
         cos = math.cos(self.origin.heading)
@@ -62,7 +62,7 @@ class OccupancyGrid:
         return math.floor(row), math.floor(column)
 
     def to_xy(self, rows: Any, columns: Any) -> NDArray[np.float64]:
-        """Points `(n, 2)` [m] at fractional cell coordinates; a cell's middle is at +0.5."""
+        """Return points `(n, 2)` [m] at fractional cell coordinates; a cell's middle is at +0.5."""
         u = np.asarray(columns, float) * self.resolution
         v = np.asarray(rows, float) * self.resolution
         cos = np.cos(self.origin.heading)
@@ -72,14 +72,14 @@ class OccupancyGrid:
         return np.stack([x, y], axis=-1)
 
     def window(self, points: NDArray[np.float64]) -> tuple[slice, slice]:
-        """Rows and columns of the cells around some points `(n, 2)` [m]."""
+        """Return rows and columns of the cells around some points `(n, 2)` [m]."""
         cells = np.array([self.to_cell(x, y) for x, y in points.tolist()])
         top, left = cells.min(axis=0)
         bottom, right = cells.max(axis=0) + 1
         return slice(max(0, top), max(0, bottom)), slice(max(0, left), max(0, right))
 
     def middles(self, window: tuple[slice, slice]) -> NDArray[np.float64]:
-        """Middles `(rows, columns, 2)` [m] of the cells in a window."""
+        """Return middles `(rows, columns, 2)` [m] of the cells in a window."""
         rows, columns = (
             np.arange(*part.indices(length)) + 0.5
             for part, length in zip(window, self.cells.shape, strict=True)
@@ -87,7 +87,7 @@ class OccupancyGrid:
         return self.to_xy(*np.meshgrid(rows, columns, indexing="ij"))
 
     def state_at(self, x: float, y: float) -> int:
-        """`FREE`, `OCCUPIED` or `UNKNOWN`; outside of the grid nothing is known."""
+        """Return `FREE`, `OCCUPIED` or `UNKNOWN`; outside of the grid nothing is known."""
         return int(self.look_up(self.cells, x, y, UNKNOWN))
 
     def look_up(self, values: NDArray[Any], x: float, y: float, outside: Any) -> Any:
@@ -111,11 +111,11 @@ class OccupancyGrid:
         return room
 
     def clearance_at(self, x: float, y: float) -> float:
-        """Room around a point [m], to within a cell; 0 where it is not known free."""
+        """Return the room around a point [m], to within a cell; 0 where it is not known free."""
         return float(self.look_up(self.clearance, x, y, 0.0))
 
     def reachable(self, clearance: float) -> NDArray[np.bool_]:
-        """The largest connected part of the cells with at least `clearance` [m] of room."""
+        """Return the largest connected part of the cells with at least `clearance` [m] of room."""
         from scipy.ndimage import label  # late: start-up
 
         labels, count = label((self.clearance >= clearance) & (self.cells == FREE))
@@ -127,7 +127,7 @@ class OccupancyGrid:
         return largest
 
     def floor(self, clearance: float) -> NDArray[np.bool_]:
-        """The connected free cells around `reachable`, up to the walls."""
+        """Return the connected free cells around `reachable`, up to the walls."""
         from scipy.ndimage import label  # late: start-up
 
         labels, _ = label(self.cells == FREE)
@@ -139,7 +139,7 @@ class OccupancyGrid:
 
 
 def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """The border of the cells `free` as few straight segments.
+    """Return the border of the cells `free` as few straight segments.
 
     Scanned walls are ragged by one cell; the segments are true to one cell.
 
@@ -161,7 +161,7 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
 
 
 def segments(geometry: Any) -> NDArray[np.float64]:
-    """All straight pieces of shapely lines or of the rings of polygons, `(n, 4)` [m]."""
+    """Return all straight pieces of shapely lines or of the rings of polygons, `(n, 4)` [m]."""
     polygons = shapely.get_parts(geometry)
     areas = shapely.get_type_id(polygons) == shapely.GeometryType.POLYGON
     lines = shapely.get_parts(np.where(areas, shapely.boundary(polygons), polygons))
@@ -171,14 +171,14 @@ def segments(geometry: Any) -> NDArray[np.float64]:
 
 
 def side(a: NDArray[np.float64], b: NDArray[np.float64]) -> frozenset[tuple[float, ...]]:
-    """A segment in either direction, to the millimetre."""
+    """Return a segment in either direction, to the millimetre."""
     return frozenset(tuple(np.round(end, 3).tolist()) for end in (a, b))
 
 
 def _runs(
     marks: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Line, start and end of each run of true values along the rows of `marks`."""
+    """Return the line, start and end of each run of true values along the rows of `marks`."""
     edges = np.diff(np.pad(marks, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     lines, starts = np.nonzero(edges == 1)
     _, ends = np.nonzero(edges == -1)
@@ -338,7 +338,7 @@ def _check_size(size: tuple[int, int], document: Document, config: RosMap) -> No
 
 
 def _most_shades(file: Path) -> int:
-    """The greatest shade that the head of a PGM file names."""
+    """Return the greatest shade that the head of a PGM file names."""
     with file.open("rb") as opened:
         head = re.sub(rb"#[^\n]*", b"", opened.read(1024)).split(maxsplit=4)
     return int(head[3]) if head[0] in (b"P2", b"P3", b"P5", b"P6") else 255
@@ -390,7 +390,7 @@ def cells_inside(
 
 
 def rasterise(floor: Any, walls: NDArray[np.float64], resolution: float) -> OccupancyGrid:
-    """The grid of a drawn plan.
+    """Return the grid of a drawn plan.
 
     Args:
         floor: Shapely area that people and robots may stand on; all else is unknown.

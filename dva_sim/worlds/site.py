@@ -90,12 +90,12 @@ class Site(FloorPlan):
         return made
 
     def room_at(self, x: float, y: float) -> str | None:
-        """Name of the room around a point [m], or None outside all rooms."""
+        """Return the name of the room around a point [m], or None outside all rooms."""
         room = self._rooms.at(x, y)
         return None if room is None else room.name
 
     def link_quality(self, x: float, y: float) -> RadioCoverage | None:
-        """The coverage drawn around a point [m], the later over the earlier; None for none."""
+        """Return the coverage drawn around a point [m], the later over the earlier, or None."""
         return self._wifi.at(x, y)
 
     @cached_property
@@ -151,7 +151,7 @@ class Site(FloorPlan):
     # --- places ------------------------------------------------------------------------
 
     def room(self, name: str) -> Room:
-        """The room of that name.
+        """Return the room of that name.
 
         Raises:
             ConfigError: there is none; the message lists the rooms.
@@ -170,7 +170,7 @@ class Site(FloorPlan):
     def sample_free(
         self, rng: np.random.Generator, clearance: float, room: str | None = None
     ) -> tuple[float, float]:
-        """A random free point that a robot can reach, or somebody slimmer if so asked.
+        """Return a random free point that a robot can reach, or somebody slimmer if so asked.
 
         Args:
             rng: Random generator.
@@ -192,7 +192,7 @@ class Site(FloorPlan):
         return x, y
 
     def place_in(self, room: str) -> tuple[float, float] | None:
-        """The place nearest to a room's middle [m] that a robot can reach; None if it has none.
+        """Return the place nearest to a room's middle [m] that a robot can reach, or None.
 
         Raises:
             ConfigError: no such room.
@@ -208,7 +208,7 @@ class Site(FloorPlan):
         return x, y
 
     def floor_near(self, x: float, y: float, within: float) -> tuple[float, float] | None:
-        """The place that a robot can reach nearest to a point [m], in the same room.
+        """Return the place that a robot can reach nearest to a point [m], in the same room.
 
         Args:
             x: To the east [m].
@@ -230,13 +230,13 @@ class Site(FloorPlan):
         return None
 
     def free_middles(self, clearance: float) -> Floats:
-        """Middles `(n, 2)` [m] of all cells that `sample_free` chooses from."""
+        """Return middles `(n, 2)` [m] of all cells that `sample_free` chooses from."""
         columns = self.grid.cells.shape[1]
         cells = self.kept((clearance, None), lambda: self._free_cells(clearance, None))
         return self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
 
     def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
-        """Flat indices of the cells that `sample_free` chooses from."""
+        """Return the flat indices of the cells that `sample_free` chooses from."""
         grid = self.grid
         way = min(clearance, FOOTPRINT)
         reached = self.kept(("reached", way), lambda: grid.reachable(way))
@@ -252,7 +252,7 @@ class Site(FloorPlan):
         return cells[shapely.contains_xy(self.ground_of(known), middles)]
 
     def ground_of(self, room: Room) -> Any:
-        """The shapely area of a room; of ground outdoors what nothing else is drawn over."""
+        """Return the shapely area of a room; of ground outdoors what nothing else is drawn over."""
         area: Any = room.area
         if not room.outdoor:
             return area
@@ -274,7 +274,7 @@ DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a ba
 def map_site(
     path: str | Path, seed: int, robots: int, guards: int, radius: float = FOOTPRINT
 ) -> Site:
-    """A bare ROS map as a site: bases and posts placed by `seed` on known, reachable floor.
+    """Return a bare ROS map as a site: bases and posts placed by `seed` on known, reachable floor.
 
     The walls are the border of the largest area that a robot can reach.
 
@@ -299,7 +299,7 @@ def _map_site(bare: Site, seed: int, robots: int, guards: int, radius: float) ->
 
 
 def with_places(site: Site, seed: int, robots: int, guards: int, radius: float = FOOTPRINT) -> Site:
-    """A site with a base for each robot and a post for each guard, however few are drawn.
+    """Return a site with a base for each robot and a post for each guard, however few are drawn.
 
     Args:
         seed: Chooses the places that are not drawn; who stands where does not depend on how
@@ -346,7 +346,7 @@ def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> 
 
 @read_once(with_named_files)
 def _bare_map(path: Path) -> Site:
-    """All of a map's site that does not depend on the seed."""
+    """Return all of a map's site that does not depend on the seed."""
     grid = load_ros_map(path)
     reached = grid.reachable(FOOTPRINT)
     if not reached.any():
@@ -372,7 +372,7 @@ def _scatter(
     drawn: Sequence[Pose] = (),
     others: Sequence[Pose] = (),
 ) -> tuple[Pose, ...]:
-    """So many more places than are drawn, apart from all there are; each has its own stream.
+    """Return so many more places than are drawn, apart from all; each has its own stream.
 
     Raises:
         ConfigError: not so many fit.
@@ -408,7 +408,7 @@ class _Places:
         self._left: Floats | None = None  # middles `(n, 2)` of free cells, once they are few
 
     def draw(self, rng: np.random.Generator) -> tuple[float, float] | None:
-        """One more place [m], which is taken then; None if there is none."""
+        """Return one more place [m], which is taken then; None if there is none."""
         place = self._at_random(rng) if self._left is None else None
         if place is None:
             place = self._of_those_left(rng)
@@ -442,7 +442,7 @@ class _Places:
 
 
 def _lattice(grid: OccupancyGrid, reached: NDArray[np.bool_]) -> tuple[Detector, ...]:
-    """Detectors on square lattices of cells that can be reached."""
+    """Return detectors on square lattices of cells that can be reached."""
     detectors = []
     sparse = math.ceil(math.sqrt(np.count_nonzero(reached) / MOST_DETECTORS))
     for kind, spacing in DETECTOR_SPACING.items():

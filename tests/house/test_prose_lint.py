@@ -18,6 +18,8 @@ FILE = Path("dva_sim/network/link.py")
         ),
         ("What is asked.", ["question"]),
         ("Whether it holds.", ["question"]),
+        ("The runs of a study.", ["verb"]),
+        ("Nobody drives it any more.", ["verb"]),
         ("Of the socket.", ["fragment"]),
         ("See `Pattern`.", ["see"]),
         ("Draw the luck of a run.", ["word"]),
@@ -28,6 +30,13 @@ FILE = Path("dva_sim/network/link.py")
 def test_each_fault_is_found(docstring, rules):
     source = f'def f(size):\n    """{docstring}"""\n'
     assert [found.rule for found in prose_lint.findings_in(source, FILE)] == rules
+
+
+def test_a_property_is_a_thing():
+    source = (
+        'class A:\n    @property\n    def age(self):\n        """The age of a command [s]."""\n'
+    )
+    assert list(prose_lint.findings_in(source, FILE)) == []
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ class NamedRooms(DecidingRooms, Protocol):
         """Return who decides, and what each may."""
 
     def leave(self, client: str) -> object:
-        """A page is gone for good."""
+        """Note that a page is gone for good."""
 
     def attend(self, pages: Mapping[str, str]) -> None:
         """Note which pages are open, and the role of each."""
@@ -133,10 +133,10 @@ class ConsolePages:
     # --- see `ConsoleSubject` --------------------------------------------------------------
 
     def serve_cameras(self, base: str) -> None:
-        """Robots that run elsewhere say themselves where their pictures are."""
+        """Leave it to robots elsewhere to say where their pictures are."""
 
     def show_scene(self) -> None:
-        """There is nothing to be drawn of a world that is known by messages alone."""
+        """Draw nothing of a world that is known by messages alone."""
 
     def note(self, text: str) -> None:
         """Tell people of a failure of the console itself."""
@@ -160,7 +160,7 @@ class ConsolePages:
         self.looked = "devices" in line["tables"]
 
     def watch(self, robots: list[int]) -> None:
-        """Somebody looks at these robots now, and at no others."""
+        """Watch these robots, and no others."""
         self.sensors.watch(robots)
 
     def author(self, client: str) -> str:

@@ -55,7 +55,7 @@ class Handhelds(Protocol):
         """Let go of the stick on a screen, if it is that of a phone."""
 
     def leaves(self, client: str) -> None:
-        """A page has left its seat of the console."""
+        """Note that a page has left its seat of the console."""
 
 
 class NoHandhelds:
@@ -68,7 +68,7 @@ class NoHandhelds:
     is_tilted = sits
 
     def let_go(self, client: str) -> None:
-        """Nothing is tilted."""
+        """Take a phone that is not tilted."""
 
     leaves = let_go
 
@@ -171,7 +171,7 @@ class Driving:
         self.leave(client)
 
     def leave(self, client: str) -> None:
-        """A page leaves its seat."""
+        """Let a page leave its seat."""
         if self.phones.sits(client):  # its device stays, as long as its page
             self.person(client).attended = True
             self.hold()
@@ -204,7 +204,7 @@ class Driving:
     # --- who is meant ----------------------------------------------------------------------
 
     def robots_in(self, line: OfRobots | OfSome) -> list[str]:
-        """Ids of the robots that a line names by their numbers or labels.
+        """Return ids of the robots that a line names by their numbers or labels.
 
         Raises:
             Refused: it names none, or one that nobody knows.
@@ -229,7 +229,7 @@ class Driving:
         return held
 
     def robot(self, given: Any) -> str:
-        """Id of a robot by its number or label.
+        """Return the id of a robot by its number or label.
 
         Raises:
             Refused: nobody knows it.
@@ -284,7 +284,7 @@ class Driving:
             ask_emergency(device, robot, 0, each)
 
     def _known_robots(self, line: OfSome) -> list[str]:
-        """Ids of the robots that an emergency is for; names that nobody knows are left out.
+        """Return ids of the robots that an emergency is for; names that nobody knows are left out.
 
         Raises:
             Refused: nobody knows any of them.
@@ -327,7 +327,7 @@ class Driving:
                 self.phones.let_go(client)
 
     def end_hidden(self, client: str) -> None:
-        """The page is hidden, or its socket closed: nobody has a hand on it."""
+        """End what a hidden page, or one with a closed socket, has in hand."""
         self.stop_client(client, "stopped: the page was hidden, left or cut off")
 
     def look(self) -> None:
@@ -465,4 +465,4 @@ def is_gone_for_good(line: Asked) -> bool:
 
 
 def _nobody(ok: bool, text: str) -> None:
-    """Takes the answer to what nobody asked for."""
+    """Take the answer to what nobody asked for."""

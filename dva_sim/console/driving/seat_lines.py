@@ -53,7 +53,7 @@ class SeatLines:
         self._acted: dict[str, ActedInput] = {}  # of the newest command in force, by robot
 
     def applied(self, drive: DriveLog) -> None:
-        """A command has taken effect: which input was behind it?"""
+        """Find the input behind a command that has taken effect."""
         held = self._held(drive)
         if held is None or not drive.applied:
             return
@@ -73,13 +73,13 @@ class SeatLines:
         return None
 
     def waiting_order(self) -> OrderShown | None:
-        """An order for a seat in which nobody sits yet."""
+        """Return an order for a seat in which nobody sits yet."""
         persons = self._persons.values()
         orders = [p.order for p in persons if p.order is not None and not p.attended]
         return self._order(orders[0]) if orders else None
 
     def lines(self) -> Iterator[tuple[str, SeatLine]]:
-        """A line for each client that sits somewhere, and for phones not registered yet."""
+        """Yield a line for each client that sits somewhere, and for phones not registered yet."""
         for number, client in self._client_of.items():
             yield client, self._line(client, self._persons[number])
         for client in self._phones.keys() - self._client_of.values():
@@ -90,7 +90,7 @@ class SeatLines:
         return None if phone is None else phone.line(time.monotonic())
 
     def free(self, client: str, phone: PhoneShown | None = None) -> SeatLine:
-        """The line of a client that sits nowhere."""
+        """Return the line of a client that sits nowhere."""
         return {
             "k": "seat",
             "t": self._system.now_ms,

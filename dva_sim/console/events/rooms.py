@@ -117,7 +117,7 @@ class ConsoleRooms:
         self.join(client, role, name, joined)
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
-        """A page's person gets a device of its role, or its device gets another name."""
+        """Give a page's person a device of its role, or another name."""
         name = self.users.get(client, name)
         room = self.by_client.get(client)
         if room is not None and (not name or room.is_called(name)):
@@ -172,7 +172,7 @@ class ConsoleRooms:
                 room.device.resume()
 
     def leave(self, client: str) -> None:
-        """A page is gone for good: what it asked for is answered yet, what it sent is open."""
+        """Let a page go for good: what it asked for is answered yet, what it sent is open."""
         room = self.by_client.pop(client, None)
         if room is not None:
             room.agent.orders.clear()

@@ -58,7 +58,7 @@ class PhoneSettings:
 
 
 def samples_of(line: SampleBatch) -> Samples:
-    """The samples of a message."""
+    """Return the samples of a message."""
     times = [when / 1000.0 for when in line["at"]]
     whole = [(x, y, z) for x, y, z in line["xyz"]]
     return Samples(line["n"], times, whole, line["hand"], line["orientation"])

@@ -91,7 +91,7 @@ class PhoneSeat:
         return [] if who is None else list(who.robots.values())
 
     def lend(self, operator: PersonAgent | None) -> None:
-        """An operator of the console tilts it from now on, or none any more."""
+        """Lend the phone to an operator of the console, or to nobody any more."""
         if operator is self.operator:
             return
         if self.operator is not None:
@@ -108,7 +108,7 @@ class PhoneSeat:
     # --- what it is told ---------------------------------------------------------------------
 
     def calibrate(self, settings: PhoneSettings) -> None:
-        """From the next drive on it works so.
+        """Calibrate the phone, from the next drive on.
 
         Raises:
             ConfigError: no phone could.
@@ -141,7 +141,7 @@ class PhoneSeat:
             self.motion.app(app)
 
     def turn(self, orientation: int) -> None:
-        """Its screen is turned."""
+        """Turn its screen."""
         if orientation != self.orientation:
             self.orientation = orientation
             self._show_again()
@@ -151,7 +151,7 @@ class PhoneSeat:
             self.new_tilt()
 
     def take(self, samples: Samples, came: float) -> bool:
-        """Samples have come; whether one of them is new.
+        """Take samples; return True if one of them is new.
 
         Args:
             samples: New samples.
@@ -175,7 +175,7 @@ class PhoneSeat:
         return True
 
     def _take_one(self, stamp: float, age: float, xyz: Triple) -> None:
-        """A sample of such an age in real time [s]: as old here, times the pace."""
+        """Take a sample of such an age in real time [s]: as old here, times the pace."""
         now = self._clock.now
         self._at = max(self._at, now - age * self._clock.factor)
         self._newest = to_tilt_axes(xyz, self.orientation, self.settings.ios)
@@ -205,7 +205,7 @@ class PhoneSeat:
         return (len(self._stamps) - 1) / (self._stamps[-1] - self._stamps[0])
 
     def line(self, now: float) -> PhoneShown:
-        """The phone's part of a seat's line.
+        """Return the phone's part of a seat's line.
 
         Args:
             now: Real time [s].

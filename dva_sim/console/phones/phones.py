@@ -65,7 +65,7 @@ class Phones:
         self._pipeline = named if named in PIPELINES else PhoneSettings.pipeline
 
     def seat(self, client: str) -> PhoneSeat | None:
-        """The phone of a page, from its first word on; None: there are too many."""
+        """Return the phone of a page, from its first word on; None: there are too many."""
         if client not in self.by_client:
             if len(self.by_client) >= MOST_PHONES:
                 return None
@@ -127,14 +127,14 @@ class Phones:
         return f"; its motion is kept in {seat.motion.name}" if seat.motion is not None else ""
 
     def close(self) -> None:
-        """The run is over: files of motion are complete."""
+        """Complete the files of motion at the end of the run."""
         for seat in self.by_client.values():
             seat.keep(None)
 
     # --- devices -----------------------------------------------------------------------------
 
     def new_person(self, seat: PhoneSeat, label: str, kind: str, address: str) -> int | None:
-        """A device for a phone, that knows a DVA at an address; the number of its seat.
+        """Return a device for a phone, that knows a DVA at an address; the number of its seat.
 
         None: too many have come and gone lately.
         """
@@ -151,7 +151,7 @@ class Phones:
         return FIRST_OF_PHONES + number
 
     def retire(self, number: int, device: AgentDevice) -> None:
-        """A phone is there no more; what it said last still goes out."""
+        """Retire a phone that has gone; what it said last still goes out."""
         device.leave()
         self._clock.call_after(RESTS, self._forget, number - FIRST_OF_PHONES, device)
 

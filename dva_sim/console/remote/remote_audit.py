@@ -121,7 +121,7 @@ class RemoteAudit(Audited):
     def _note_answer(
         self, asked: AskedDecision, client: str, line: Asked, outcome: str, text: str
     ) -> None:
-        """All that is known of a decision is what was asked for, and what was answered."""
+        """Note a decision by request and answer, which are all that is known."""
         values = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}
         waited = self._system.age_of(asked.event)
         self.keeper.put(

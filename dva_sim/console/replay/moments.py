@@ -52,7 +52,7 @@ def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPo
 
 
 def set_point(drive: DriveLog | None, now: float) -> tuple[float, float]:
-    """The newest command of a drive: speed [m/s] and turn rate [rad/s], as its phone made it."""
+    """Return the newest command of a drive as made: speed [m/s] and turn rate [rad/s]."""
     commands: Sequence[tuple[float, float, float]] = () if drive is None else drive.commands
     index = bisect_right(commands, now, key=lambda command: command[0])
     return commands[index - 1][1:] if index else (0.0, 0.0)

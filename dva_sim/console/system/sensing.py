@@ -55,7 +55,7 @@ class SensorWatch:
         self._ask()
 
     def end(self) -> None:
-        """Nobody looks any more: the permission is given back."""
+        """Give the permission back, as nobody looks any more."""
         self._over = True
         for name, subscription in self._subscriptions.items():
             subscription.close()
@@ -103,7 +103,7 @@ class SensorWatch:
         self._ask_later()  # which renews all of it
 
     def _subscribe(self, name: str) -> None:
-        """The robot may not know of the permission yet."""
+        """Subscribe again: the robot may not know of the permission yet."""
         start(
             *(self._device, self._robot, m.DevSub(name, self._rate_hz), lambda: self._session or 0),
             wanted=lambda: not self._over,
@@ -145,7 +145,7 @@ class WatchedSensors:
         self._looked: list[int] = []
 
     def watch(self, numbers: list[int]) -> None:
-        """Somebody looks at these robots now, and at no others."""
+        """Watch these robots, and no others."""
         self._looked = numbers[:MOST]
         self.go_on()
 

@@ -90,7 +90,7 @@ class Feed:
     # --- how they are ----------------------------------------------------------------------
 
     def robots(self, held_by_lag: bool) -> list[RobotRow]:
-        """A row for each robot."""
+        """Return a row for each robot."""
         now = self._run.clock.now
         if now - self._rated >= 1.0:
             self._rated = now
@@ -131,7 +131,7 @@ class Feed:
         }
 
     def pattern_of(self, robot: str) -> str:
-        """The name of the pattern by which a robot is driven next, or now."""
+        """Return the name of the pattern by which a robot is driven next, or now."""
         return self._run.stage.pattern_name(robot)
 
     def people(self) -> list[DoingShown]:
@@ -157,6 +157,6 @@ def story_of(recorder: Recorder) -> Iterator[StoryLine]:
 
 
 def moment_shown(moment: Moment) -> Happened:
-    """A moment of a story."""
+    """Return a moment of a story."""
     time, who, what, kind = moment
     return {"t": round(1000 * time), "who": who, "what": what, "kind": kind}

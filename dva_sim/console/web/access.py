@@ -77,7 +77,7 @@ class Entrance:
     logins: Logins | None = None
 
     def role(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Role:
-        """The best role of what is shown: a token in the address, a header, a cookie; a login."""
+        """Return the best role of what is shown: token in the address, header, cookie, login."""
         if not self.tokens.are_asked:
             return Role.SUPERVISE
         kind, _, bearer = headers.get("authorization", "").partition(" ")
@@ -104,7 +104,7 @@ class Entrance:
         return self._cookie(self.cookie, self.tokens.of(role))
 
     def cookie_of_login(self, token: str) -> str:
-        """The header that gives a browser its login, or takes it back: then the token is empty."""
+        """Return the header that gives a browser its login, or takes it back by an empty token."""
         lasts = round(LASTS) if token else 0
         return f"{self._cookie(self.login_cookie, token)}; Max-Age={lasts}"
 

@@ -212,7 +212,7 @@ class Clients:
         return client if client is not None and client.is_here else None
 
     def find(self, key: Any, role: Role) -> Client | None:
-        """The page or program that a key belongs to, if its token has the same role as before."""
+        """Return the page or program of a key, if its token has the same role as before."""
         client = self._by_key(key) if isinstance(key, str) else None
         is_there = client is not None and (client.is_here or client.asked)
         return client if client is not None and is_there and client.role is role else None

@@ -182,7 +182,7 @@ class RunState:
         return self._deltas[version]
 
     def snapshot(self) -> str:
-        """All there is, as JSON without its first brace; the same text for all who ask at once."""
+        """Return all there is, as JSON without its first brace; one text for all who ask."""
         if self._snapshot[0] != self.version:
             state = {
                 "pos": list(self.places.values()),

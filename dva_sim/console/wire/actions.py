@@ -113,7 +113,7 @@ def _agree(_: dict[str, Any]) -> None:
 
 
 def check_times(asked: dict[str, Any]) -> None:
-    """A time for each sample, and each later than the one before.
+    """Check that each sample has a time, later than the one before.
 
     Raises:
         BadMessage: it is otherwise.

@@ -67,7 +67,7 @@ class DrivenRun(DrivenSystem):
         return device
 
     def _watch_robot(self, held: HeldRobot) -> None:
-        """Frames of a robot in somebody's hands are those that the seat gets."""
+        """Take the frames of a driven robot from what its seat gets."""
         usual = held.on_frame
 
         def on_frame(held: HeldRobot, frame: Any) -> None:

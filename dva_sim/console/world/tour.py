@@ -60,7 +60,7 @@ def tour_of(run: Run, numbers: Mapping[str, int]) -> TourPlan | None:
 
 
 def way_of(site: Site, robots: tuple[RobotAgent, ...]) -> FreeWay | None:
-    """The longest way that all of them have: with room beside it and with a turn, if it can be."""
+    """Return the longest way that all have: with room beside it and with a turn, if possible."""
     for rooms, turned in product((WIDE, NARROW), (True, False)):
         for room in rooms:
             sides = [side for side in _sides() if (abs(side) >= TURNED) is turned]

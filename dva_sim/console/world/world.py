@@ -183,7 +183,7 @@ class ConsoleWorld(ConsolePages):
         return team | {id_tag for id_tag in here if kind_of(id_tag)[0] not in FROM_OUTSIDE}
 
     def _windows(self) -> RobotWindows:
-        """The robots' windows; a reply that is dropped is audited and kept, like any that goes."""
+        """Return the robots' windows; a dropped reply is audited and kept like any other."""
         run = self.run
         recorder = self.recorder
         recorder.robots = run.field.robots.keys()
@@ -228,7 +228,7 @@ class ConsoleWorld(ConsolePages):
         return super().author(client)
 
     def _node_of(self, label: str) -> str | None:
-        """The id of a device of the run by its label."""
+        """Return the id of a device of the run by its label."""
         devices = self.run.stage.devices
         return next((device.id_tag for device in devices if device.label == label), None)
 
@@ -238,7 +238,7 @@ class ConsoleWorld(ConsolePages):
     # --- the pace and the link ---------------------------------------------------------------
 
     def _late(self, behind: float) -> None:
-        """An event comes too late: above the limit nobody drives on."""
+        """Note an event that comes too late: above the limit nobody drives on."""
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, too far for driving"
             self.hold(why)

@@ -85,7 +85,7 @@ class OperatorAware(BatchOptimal):
 
 
 def match(cost: Floats, robots: NDArray[np.bool_], operators: int) -> list[tuple[int, int]]:
-    """The cheapest of all largest matchings with at most `operators` robots, as (row, column).
+    """Return the cheapest largest matching with at most `operators` robots, as (row, column).
 
     An impossible pair costs more than everything else together, so the largest matchings win.
 

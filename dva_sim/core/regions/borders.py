@@ -66,7 +66,7 @@ class Borders:
         return sends
 
     def forget(self, device: str) -> None:
-        """A device is not registered here any longer."""
+        """Forget a device that is not registered here any longer."""
         for kept in (self._since, self._homes, self._asked, self.returning):
             kept.pop(device, None)
         self.help.lent.discard(device)

@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 
 def links_of(config: LinkConfig, seed: int, by_packet: bool = True) -> Links:
-    """Both directions of a link that real packets cross: near to far (`up`), and back (`down`).
+    """Forward real packets in both directions: near to far (`up`), and back (`down`).
 
     Args:
         config: Both directions.

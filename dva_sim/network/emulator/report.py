@@ -31,7 +31,7 @@ class Durations:
             self.longest_s = duration
 
     def quantile(self, share: float) -> float:
-        """The duration [s] that a share of all does not exceed, within one percent; nan if none."""
+        """Return the duration [s] that a share does not exceed, within one percent; nan if none."""
         wanted = share * self._counts.total()
         for step in sorted(self._counts):
             wanted -= self._counts[step]

@@ -314,7 +314,7 @@ def check_partitions(partitions: Sequence[Partition], names: Collection[str]) ->
 def part_links(
     links: tuple[Link, Link], source: str, destination: str, partitions: Sequence[Partition]
 ) -> tuple[Link, Link]:
-    """The link from one node to another and the one back, as far as partitions let them through.
+    """Return the link from one node to another and back, as far as partitions allow.
 
     Args:
         links: Links without partitions.

@@ -50,7 +50,7 @@ class Reno:
             self._avoid(segments, now, ahead)
 
     def reduce(self, now: float) -> float:
-        """A loss: the new threshold [segments]; the window itself is brought down by others."""
+        """Return the new threshold [segments] after a loss; others bring the window down."""
         self.threshold = max(float(int(int(self.window) * self.BACKOFF)), MIN_WINDOW)
         self.window = float(int(self.window))
         return self.threshold

@@ -64,7 +64,7 @@ class SendBuffer:
         self.blocked = self.is_cut = False
 
     def offered(self, window: int) -> None:
-        """The other end has room for `window` bytes [B]: packets may wait that are half as long."""
+        """Note the other end's room of `window` bytes [B]: packets half as long may wait."""
         if window > self._largest_window:
             self._largest_window = window
             segments = min(WAITING_SEGMENTS, window // 2 // self._mss)
@@ -92,7 +92,7 @@ class SendBuffer:
         return taken
 
     def depart(self, size: int) -> int:
-        """A segment of `size` bytes [B] leaves: what it is charged until it is acknowledged [B]."""
+        """Return the charge of a leaving segment of `size` bytes until it is acknowledged [B]."""
         waiting = self._waiting
         left = size
         packets = 0

@@ -224,7 +224,7 @@ def answer_each(clock: Clock, sender: DatagramSender, back: Link, header: int) -
 
 
 def tcp_session(clock: Clock, ends: Ends, options: TcpOptions) -> TransportSession:
-    """One connection for both directions, alike at both ends; nothing frames the messages."""
+    """Return one connection for both directions, alike at both ends; messages have no frame."""
     connection = TcpConnection(clock, ends.up, ends.down, options, options)
     operator = connection.opener
     robot = connection.peer

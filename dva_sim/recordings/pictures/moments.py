@@ -63,7 +63,7 @@ class Moments:
         return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
 
     def within(self, time: float) -> float:
-        """The moment [s] to show at `time`: a run that has ended stays as it was at its end."""
+        """Return the moment [s] to show at `time`: an ended run stays as it was at its end."""
         return min(time, self.recording.duration)
 
     def is_there(self, name: str, time: float) -> bool:

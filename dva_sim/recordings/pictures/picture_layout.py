@@ -73,7 +73,7 @@ class Sheet:
         ]
 
     def below(self, column: int, left: float, top: float, width: float, height: float) -> Axes:
-        """A part of what is left free below a column: its place and size, as shares of that."""
+        """Return place and size of a part of the space below a column, as shares of that."""
         begins, high = self._below
         x = self._left(column) + left * self._across
         y = begins + top * high

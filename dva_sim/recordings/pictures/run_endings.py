@@ -47,7 +47,7 @@ def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:
 
 
 def decided_at(found: Sequence[RunVerdict]) -> float | None:
-    """The moment that shows what some runs differ in: when the first one had come to a good end."""
+    """Return the moment that shows how runs differ: when the first had come to a good end."""
     return min((verdict.time for verdict in found if verdict.good), default=None)
 
 

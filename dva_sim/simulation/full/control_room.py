@@ -60,7 +60,7 @@ def add_dva(
     number: int = 1,
     life: int = 0,
 ) -> DvaAgent:
-    """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
+    """Return the DVA; sessions are drawn by the run's seed where no other `permissions` are given.
 
     Args:
         permissions: Permissions, if not drawn by the seed.
@@ -166,7 +166,7 @@ MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
 
 
 def at_event_m(scenario: Scenario) -> float:
-    """From how far somebody may see what was reported somewhere [m].
+    """Return from how far somebody may see what was reported somewhere [m].
 
     Guards and cameras see so far; reports nearer than may be merged are of one event.
     """
@@ -203,7 +203,7 @@ class _Ways:
 
 
 def _ground(stage: Stage) -> SiteKnowledge:
-    """Guards wait at their posts; each room is a zone that counts by its floor's area."""
+    """Return guards at their posts; each room is a zone that counts by its floor's area."""
     frame = stage.site.frame
     stations = tuple(
         WaitingPlace(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
@@ -220,7 +220,7 @@ def _ground(stage: Stage) -> SiteKnowledge:
 
 
 def _patrols(stage: Stage) -> Patrols:
-    """The beats of the scenario's robots.
+    """Return the beats of the scenario's robots.
 
     Raises:
         ConfigError: a room that the site does not have, or a place where no robot fits.
@@ -240,7 +240,7 @@ def _patrols(stage: Stage) -> Patrols:
 
 
 def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
-    """The person who dispatches by a script, at the first control room, if there is one."""
+    """Return the person who dispatches by a script, at the first control room, if there is one."""
     profile = stage.scenario.dispatch.person
     if profile is None:
         return None
@@ -284,7 +284,7 @@ def setup_by(
 
 
 def console_of(stage: Stage, scenario: Scenario) -> Console:
-    """Equipment of a real person at a console."""
+    """Return the equipment of a real person at a console."""
     return Console(
         setup=setup_of(stage, scenario), phone=phone_profile(scenario), reach=stage.reach
     )
@@ -293,7 +293,7 @@ def console_of(stage: Stage, scenario: Scenario) -> Console:
 def add_operator(
     stage: Stage, number: int, truth: Callable[[str], Truth[Observation]] | None = None
 ) -> OperatorAgent:
-    """The `number`-th operator.
+    """Return the `number`-th operator.
 
     Args:
         number: Number, from 1.

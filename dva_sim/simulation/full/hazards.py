@@ -134,7 +134,7 @@ def _hearsay(
 
 
 def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
-    """Its position; else a free place in its room, or in some room that is watched for its kind.
+    """Return its position; else a free place in its room, or in one watched for its kind.
 
     Where bases are everywhere it is the place that was found to be farthest from them.
     """

@@ -111,7 +111,7 @@ class RealLinks(Protocol):
         """Open the sockets of a device by its kind and number: its address."""
 
     def time_of_day(self) -> tuple[float, bool]:
-        """Start of the run [s since midnight], and True for exact timestamps."""
+        """Return the start of the run [s since midnight], and True for exact timestamps."""
 
     def watch(self, listener: Listener) -> None:
         """Tell of each message that is sent or arrives."""
@@ -394,7 +394,7 @@ class Run:
         self.dvas[id_tag].start()
 
     def be_patient(self, scenario: Scenario) -> None:
-        """From now on everybody waits for answers as long as another scenario's link needs."""
+        """Let everybody wait for answers as long as another scenario's link needs."""
         for device in self.stage.devices:
             device.be_patient(request_timeout_s(scenario))
 
@@ -406,7 +406,7 @@ class Run:
         self.recorder.message_sent(now, source, to, size, payload)
 
     def _make_links(self) -> dict[str, tuple[Link, Link]]:
-        """To each robot and back, by its id."""
+        """Return links to each robot and back, by its id."""
         links = {}
         for number in range(1, self.scenario.robot.count + 1):
             robot = id_of("robot", number)
@@ -433,7 +433,7 @@ class Run:
         return links
 
     def _reception(self, robot: str) -> Reception | None:
-        """The radio link's quality where a robot was at the last tick of the physics."""
+        """Return the radio link's quality where a robot was at the last tick of the physics."""
         known = self.field.robots.get(robot)  # it talks before the next one has been placed
         if known is None:
             return None
@@ -441,7 +441,7 @@ class Run:
         return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
-        """The link from one to another and the one back, as far as they are not parted."""
+        """Return the link from one to another and the one back, as far as they are not parted."""
         links = self._unparted(source, destination)
         partitions = self.scenario.link.partitions
         if not partitions:
@@ -452,7 +452,7 @@ class Run:
         )
 
     def _unparted(self, source: str, destination: str) -> tuple[Link, Link]:
-        """A robot's link or the backbone; everybody else is on the LAN."""
+        """Return a robot's link or the backbone; everybody else is on the LAN."""
         if destination in self.links:
             return self.links[destination]
         if source in self.links:
@@ -480,12 +480,12 @@ class Run:
         return motion_of(self.field.robots[robot])
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """A message has been sent."""
+        """Note that a message has been sent."""
         for observer in self._observers:
             observer.sent(now, source, to, payload)
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        """A message has arrived."""
+        """Note that a message has arrived."""
         for observer in self._observers:
             observer.delivered(now, source, to, payload)
 
@@ -498,12 +498,12 @@ class Run:
             observer.by_hand(done)
 
     def deafened(self, robot: str, deaf: bool) -> None:
-        """A robot's computer hangs and hears nothing, or hears again."""
+        """Let a robot's computer hang and hear nothing, or hear again."""
         for observer in self._observers:
             observer.deafened(self.clock.now, robot, deaf)
 
     def slowed(self, processing: float) -> None:
-        """From now on a message takes a robot's computer so long on average [s]."""
+        """Let a message take a robot's computer so long on average from now on [s]."""
         for observer in self._observers:
             observer.slowed(self.clock.now, processing)
 

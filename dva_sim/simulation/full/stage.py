@@ -59,19 +59,19 @@ _ROOMS = {
 
 
 def id_of(kind: str, number: int) -> str:
-    """The id of the `number`-th device of a kind, from 1: locally administered, never random."""
+    """Return the id of the `number`-th device of a kind, from 1: locally administered."""
     return f"02:00:00:{_ROOMS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
 
 
 def kind_of(id_tag: str) -> tuple[str, int]:
-    """The kind and the number of a device by its id; of a stranger, an empty kind."""
+    """Return the kind and the number of a device by its id; of a stranger, an empty kind."""
     *_, room, high, low = id_tag.split(":")
     kind = next((kind for kind, number in _ROOMS.items() if number == int(room, 16)), "")
     return kind, int(high + low, 16)
 
 
 def team_of(scenario: Scenario) -> Iterator[str]:
-    """All devices of a scenario by id; each report may have a detector or a caller."""
+    """Yield all devices of a scenario by id; each report may have a detector or a caller."""
     counts = {
         "robot": scenario.robot.count,
         "guard": scenario.guard.count,
@@ -130,12 +130,12 @@ def release_of(scenario: Scenario, attended: bool) -> ReleasedBy | None:
 
 
 def label_of(kind: str, number: int) -> str:
-    """Its name for people: `robot-1`; of the DVA there is but one."""
+    """Return its name for people: `robot-1`; of the DVA there is but one."""
     return "dva" if kind == "dva" else f"{kind}-{number}"
 
 
 def address_of(kind: str, number: int) -> str:
-    """Its address in the registration, where nobody has a real one."""
+    """Return its address in the registration, where nobody has a real one."""
     return f"192.168.{_ROOMS[kind]}.{number % 250 + 1}"
 
 
@@ -260,7 +260,7 @@ class Stage:
         return self.dvas_for(region)
 
     def device(self, kind: str, number: int, at: tuple[float, float] | None = None) -> AgentDevice:
-        """A new device: its identity and ways to talk.
+        """Return a new device: its identity and ways to talk.
 
         Args:
             kind: Such as `robot`.
@@ -322,12 +322,12 @@ class Stage:
 
 @lru_cache(maxsize=4)
 def planner_of(site: Site, radius: float) -> Planner:
-    """Ways through a site for what has a radius [m]; the same site is planned for once."""
+    """Return ways through a site for what has a radius [m]; the same site is planned for once."""
     return Planner(site, radius)
 
 
 def middle_of(site: Site, room: str) -> tuple[float, float]:
-    """The place in a room that is farthest from everything [m].
+    """Return the place in a room that is farthest from everything [m].
 
     Raises:
         ConfigError: there is no such room.

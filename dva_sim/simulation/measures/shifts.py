@@ -168,7 +168,7 @@ Columns = dict[str, NDArray[Any]]
 
 
 def tables(recording: TimedRecording, follow: float = FOLLOW_S) -> dict[str, list[Row]]:
-    """The rows of a run: one of the run, one for each event of the cohort, one per responder.
+    """Return a run's rows: of the run, of each event of the cohort, of each responder.
 
     Args:
         recording: The run; it must have kept its events.
@@ -283,7 +283,7 @@ def only(events: Columns, mask: NDArray[np.bool_]) -> Columns:
 
 
 def zone_ratio(events: Columns, follow: float) -> float:
-    """The worst zone's restricted mean response over the best one's; nan with fewer than two."""
+    """Return the worst zone's restricted mean response over the best's; nan below two zones."""
     means = [
         reaching(only(events, here), "response_s").restricted_mean(follow)
         for zone in sorted(set(events["zone"].tolist()))

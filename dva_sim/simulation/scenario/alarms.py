@@ -38,7 +38,7 @@ def with_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> Sce
 
 
 def table_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> TableEvents:
-    """The alarms of a scenario's table, and what is said of them; raises as `read_events`."""
+    """Return the alarms of a scenario's table, and remarks on them; raises as `read_events`."""
     site = site_of(scenario, seed=0)
     is_on_earth = scenario.site.map is None
     ground = Ground(

@@ -64,7 +64,7 @@ def _of_modelled_link(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_link(scenario: Scenario) -> Iterator[str]:
-    """Time-outs and limits that the link's delay, or its rate, goes beyond."""
+    """Yield time-outs and limits that the link's delay, or its rate, goes beyond."""
     trip = round_trip_s(scenario.link)
     needs, timeout = start_needs_s(scenario), request_timeout_s(scenario)
     why = f"with a round trip of {trip:g} s"
@@ -114,7 +114,7 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_computer(scenario: Scenario) -> Iterator[str]:
-    """A robot that needs longer for a command than the next one takes to come."""
+    """Yield a robot that needs longer for a command than the next one takes to come."""
     takes = mean_processing_s(scenario)
     rate = scenario.command.rate_hz
     pattern = pattern_of(scenario)
@@ -144,7 +144,7 @@ def _of_pictures(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_watchdog(scenario: Scenario, live: bool) -> Iterator[str]:
-    """A robot that stops between any two commands."""
+    """Yield a robot that stops between any two commands."""
     if not _drives(scenario):
         return
     limit = scenario.robot.watchdog_s
@@ -214,7 +214,7 @@ def _of_time(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_detectors(scenario: Scenario) -> Iterator[str]:
-    """Events that nobody reports and no detector of the site can notice."""
+    """Yield events that nobody reports and no detector of the site can notice."""
     unreported = [(n, event) for n, event in enumerate(scenario.events) if not event.reported]
     there = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
     for number, event in unreported:

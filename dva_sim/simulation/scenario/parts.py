@@ -114,7 +114,7 @@ Kinds = Kind | dict[Annotated[int, BeforeValidator(_number), Field(ge=1)], Kind]
 
 
 def persons_of(kinds: Kinds, count: int) -> tuple[int, ...]:
-    """The numbers of those who are persons."""
+    """Return the numbers of those who are persons."""
     if isinstance(kinds, str):
         return tuple(range(1, count + 1)) if kinds == "person" else ()
     return tuple(sorted(number for number, kind in kinds.items() if kind == "person"))
@@ -204,7 +204,7 @@ class PhoneConfig(BaseModel):
 
     @classmethod
     def further_keys(cls) -> type[BaseModel]:
-        """The model of all other keys that it may have."""
+        """Return the model of all other keys that it may have."""
 
         return PhoneProfile
 

@@ -143,7 +143,7 @@ class Scenario(WithTable):
 
 
 def pattern_of(scenario: Scenario) -> Pattern:
-    """The messaging pattern of a scenario, to be asked what it is.
+    """Return the messaging pattern of a scenario, to be asked what it is.
 
     Raises:
         ConfigError: there is no such pattern, or it does not know its options.
@@ -152,7 +152,7 @@ def pattern_of(scenario: Scenario) -> Pattern:
 
 
 def site_of(scenario: Scenario, seed: int) -> Site:
-    """The site a scenario plays on; bases and posts that it has not are placed by `seed`.
+    """Return the site a scenario plays on; bases and posts that it has not are placed by `seed`.
 
     Raises:
         ConfigError: the site cannot be read, or has no room for so many.
@@ -178,7 +178,7 @@ def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
 
 
 def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile:
-    """The tilt phone the operators hold: its profile, and what the scenario changes of it.
+    """Return the tilt phone the operators hold: its profile, and what the scenario changes of it.
 
     Args:
         scenario: Names the profile.
@@ -223,7 +223,7 @@ def bystander_profile(scenario: Scenario) -> BystanderProfile:
 
 
 def population(operator: OperatorConfig) -> Population:
-    """The population that persons are drawn from, with the medians and habits set otherwise.
+    """Return the population that persons are drawn from, with the medians and habits set otherwise.
 
     Raises:
         ConfigError: there is no such population or trait.
@@ -238,7 +238,7 @@ Drawn = TypeVar("Drawn", Population, GuardProfile, BystanderProfile)
 def _changed(
     profile: Drawn, by: OperatorConfig | GuardConfig | BystanderConfig, whose: str
 ) -> Drawn:
-    """A profile with the medians and habits that a scenario sets otherwise."""
+    """Return a profile with the medians and habits that a scenario sets otherwise."""
     profile = with_medians(profile, by.traits, whose)
     habits = profile.habits.changed_by(by.habits)
     return profile if habits is profile.habits else profile.model_copy(update={"habits": habits})
@@ -252,7 +252,7 @@ def _profile(model: type[M], name: str, folder: str) -> M:
 
 @cache
 def _read_profile(model: type[Config], name: str, folder: str) -> Config:
-    """A profile, read once per process: reading costs more than a short run."""
+    """Return a profile, read once per process: reading costs more than a short run."""
     document = _read_document(name, folder)
     return validate(model, document.data, document.error)
 
@@ -263,7 +263,7 @@ def _read_document(name: str, folder: str) -> Document:
 
 
 def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Data with some values changed, mappings within it key by key."""
+    """Return the data with some values changed, mappings within it key by key."""
     merged = dict(data)
     for key, value in changes.items():
         old = merged.get(key)

@@ -16,7 +16,7 @@ _ROOM = 1.25  # over what is needed, beyond the usual
 
 
 def time_out_s(needed_s: float) -> float:
-    """The time-out of a request that nobody gave one [s]: the usual one, or longer.
+    """Return the time-out of a request that nobody gave one [s]: the usual one, or longer.
 
     Args:
         needed_s: Time that the first reply over a new connection takes [s].
@@ -25,7 +25,7 @@ def time_out_s(needed_s: float) -> float:
 
 
 def request_timeout_s(scenario: Scenario) -> float:
-    """Time-out of a request: as given, else as the link and the backbone need it [s]."""
+    """Return the time-out of a request: as given, else as the link and the backbone need it [s]."""
     given = scenario.request.timeout_s
     backbone = scenario.dva.backbone
     needed_s = start_needs_s(scenario)
@@ -35,7 +35,7 @@ def request_timeout_s(scenario: Scenario) -> float:
 
 
 def command_timeout_s(scenario: Scenario) -> float:
-    """Time-out of a command that is to be answered, likewise [s]."""
+    """Return the time-out of a command that is to be answered, likewise [s]."""
     given = scenario.command.timeout_s
     return time_out_s(start_needs_s(scenario)) if given is None else given
 

@@ -218,7 +218,7 @@ def _speed(streams: Streams, group: Group, name: str) -> float:
 
 
 def make_core(shift: Team, policy: Policy) -> Dva:
-    """The DVA's core, with the scenario's rules; nobody falls silent, as nobody can be lost."""
+    """Return the DVA's core, with the scenario's rules; nobody can fall silent or be lost."""
     config = shift.scenario.dispatch
     rules = Rules(
         escalate_after=limit_of(config.escalate_after_s),

@@ -137,7 +137,7 @@ def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
 
 
 def table_events(scenario: TimedScenario, error: Fail) -> TableEvents:
-    """The alarms of a scenario's table, and what is said of them; raises as `read_events`."""
+    """Return the alarms of a scenario's table, and remarks on them; raises as `read_events`."""
     assert scenario.events is not None
 
     def fail(problem: str, path: KeyPath) -> ConfigError:

@@ -129,7 +129,7 @@ class Uprights:
         return pack(np.concatenate([*parts, plain, *signs]).clip(0, 255).astype(np.uint8)).ravel()
 
     def _lintel(self, text: str, wide: float, height: Any) -> NDArray[np.float64]:
-        """The wall over a door with the name of the room behind it, `(SIGN_COLUMNS, TEXELS, 3)`."""
+        """Return the wall over a door with the room's name, `(SIGN_COLUMNS, TEXELS, 3)`."""
         colours = np.ones((SIGN_COLUMNS, TEXELS, 1)) * np.array(PLASTER, dtype=np.float64)
         colours[:, height < DOOR_HEIGHT + 0.08] = WOOD
         room = int(np.count_nonzero(height > DOOR_HEIGHT + 0.12))

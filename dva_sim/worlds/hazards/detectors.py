@@ -79,7 +79,7 @@ class DetectorAlarm(NamedTuple):
 
 
 def alarm_in(detector: str, air: Callable[[float], Conditions]) -> DetectorAlarm:
-    """A kind of detector that knows the air around it at each age [s], and the floor below."""
+    """Return a kind of detector that knows the air around it at each age [s], and the floor."""
     carbon_monoxide = CoAlarm()
     sounds: dict[str, Callable[[float, float], bool]] = {
         "smoke": lambda age, dt: air(age).extinction >= SMOKE_ALARM,

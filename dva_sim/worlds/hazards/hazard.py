@@ -293,7 +293,7 @@ def detection_time(hazard: Hazard, detector: Detector, site: Site) -> float:
 
 
 def first_detection(hazard: Hazard, site: Site) -> tuple[Detector | None, float]:
-    """The detector that notices a hazard first, and when [s]; None and infinity if none does."""
+    """Return the detector that notices a hazard first, and when [s]; None and infinity else."""
     return _first(hazard, [d for d in site.detectors if d.kind in hazard.noticed_by()], site)
 
 
