@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 
 def links_of(config: LinkConfig, seed: int, by_packet: bool = True) -> Links:
-    """Forward real packets in both directions: near to far (`up`), and back (`down`).
+    """Return both directions of a link for real packets: near to far (`up`), and back (`down`).
 
     Args:
         config: Both directions.

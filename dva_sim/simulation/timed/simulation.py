@@ -144,7 +144,7 @@ class Shift:
             self.clock.call_at(start, self._begin_shift, on_duty)
 
     def _open_mail(self, policy: Policy) -> Mail:
-        """Decide again as long as orders build on each other, or guards move."""
+        """Return the mail: one decision leads to the next where orders build up, or guards move."""
         containment = self.scenario.dispatch.containment
         attentive = containment or policy.preempts or policy.relocates
         return Mail(self.core, self.clock, self._changed, self._tell_who_moves, attentive)
