@@ -101,6 +101,8 @@ def check(options: LiveOptions) -> Scenario:
         raise ConfigError("--foxglove is for whole runs: leave out --only")
     if options.only != "dva" and (options.page is not None or options.no_page):
         raise ConfigError(f"--{'no-page' if options.no_page else 'page'} is for --only dva")
+    if options.users is not None and not options.serves_page:
+        raise ConfigError("--users is for the page of --only dva")
     if options.link:
         _check_emulated(options, scenario)
     check_room_for(scenario.robot.count + scenario.guard.count + scenario.operator.count)

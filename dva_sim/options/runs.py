@@ -93,6 +93,12 @@ class ReplayOptions(PictureOptions):
     ] = None
 
 
+Users = Annotated[
+    Path | None,
+    OptionForm("File of the users who may log in; see dva-sim users.", metavar="USERS.json"),
+]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, match_args=False)
 class PageOptions:
     """Options of commands that serve a page: its address, and whether it needs a token."""
@@ -103,10 +109,7 @@ class PageOptions:
     no_token: Annotated[
         bool, OptionForm("Disable the access token: anyone who can reach the page gets in.")
     ] = False
-    users: Annotated[
-        Path | None,
-        OptionForm("File of the users who may log in; see dva-sim users.", metavar="USERS.json"),
-    ] = None
+    users: Users = None
 
 
 @dataclass(frozen=True, eq=False, match_args=False)
@@ -170,6 +173,7 @@ class LiveOptions:
         port_form("With --only dva: port of its page; default: 8765, or any that is free. 0: any."),
     ] = None
     no_page: Annotated[bool, OptionForm("With --only dva: serve no page.")] = False
+    users: Users = None
     rosbridge: Rosbridge = None
     foxglove: Foxglove = None
     no_token: Annotated[

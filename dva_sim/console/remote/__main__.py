@@ -22,8 +22,8 @@ def main(words: list[str]) -> int:
     parser.add_argument("argument", help="options of the page, as JSON")
     given = parser.parse_args(words)
     asked = json.loads(given.argument)
-    keys = asked["keys"]
-    options = ConsoleOptions(**asked["options"], keys=None if keys is None else Path(keys))
+    files = {name: Path(file) for name, file in asked["files"].items()}
+    options = ConsoleOptions(**asked["options"] | files)
     pipe = LinePipe(given.fd, PLAIN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the DVA's process says when it is over
     bench = PipedBench(pipe, str(options.dva))

@@ -93,8 +93,9 @@ class PageBeside:
             "no_open": True,
             "no_token": options.no_token,
         }
-        keys = None if options.keys is None else str(options.keys)
-        return json.dumps({"options": page, "keys": keys, "own": own})
+        files = {"keys": options.keys, "users": options.users}
+        given = {name: str(file) for name, file in files.items() if file is not None}
+        return json.dumps({"options": page, "files": given, "own": own})
 
     def _hear(self, line: dict[str, Any], port: DvaPort) -> None:
         if line["k"] == "say":

@@ -21,6 +21,7 @@ from dva_sim.network.keys import create_keys
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.serving.listening import listen
+from dva_sim.serving.users import UserFile
 from dva_sim.simulation.full.stage import DVA, id_of, team_of
 from dva_sim.simulation.scenario import build, load
 
@@ -156,6 +157,17 @@ def test_with_keys_the_page_is_the_control_room_whose_key_is_in_the_folder(progr
     assert becomes(lambda: bare.log(device=id_of("control-room", 1)))
 
 
+def test_users_log_in_to_the_page(programs, tmp_path):
+    users = tmp_path / "users.json"
+    UserFile(users).add("ana", "supervise", "correct horse")
+    bare = BareDva(programs, "--users", str(users))
+    address = re.findall(r"^Console: +(\S+?)/?[?]", bare.program.output, re.MULTILINE)[0]
+    with urllib.request.urlopen(address, timeout=PATIENCE_S) as answer:
+        page = answer.read().decode()
+    assert "/login?next=/" in answer.url
+    assert "Log in" in page
+
+
 def test_without_a_key_for_it_there_is_no_page_and_a_line_says_which_is_missing(programs, tmp_path):
     keys = tmp_path / "keys"
     create_keys(keys, [DVA])
@@ -186,6 +198,7 @@ def test_what_cannot_be_is_told_in_a_line():
             (("--page", "0"), ["--page", "--only dva"]),
             (("--no-page",), ["--no-page", "--only dva"]),
             (("--only", "dva", "--page", port), ["--page", port]),
+            (("--users", "users.json"), ["--users", "--only dva"]),
         ):
             ended = call("live", "hands-on", *words)
             assert ended.returncode == 2
