@@ -161,7 +161,7 @@ def test_the_place_by_satellite_counts_where_the_site_lies_there(console, visits
 
 def test_a_guard_says_on_the_phones_page_of_an_event_that_he_goes(console, visits, desk):
     running = console(*WORDS)
-    number = raised(desk, "gas leak", "Office 320")
+    number = raised(desk, "flood")
     page = visits(**SCREEN).tab()
     page.goto(f"{running.phone}#/event?{number}")
     who = page.get_by_label("I am", exact=True)
