@@ -285,20 +285,26 @@ def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> L
         children.append(Child(f"load process {number}", words, stdin=pipe, stdout=pipe))
     before = dva.used_s
     try:
-        said = [_said(child) for child in children]
+        every = [json.loads(said(child)) for child in children]
         looked = dva.look(before, settle + options.duration)
     finally:
         end_all(children)
-    for child, text in zip(children, said, strict=True):
-        if not text:
-            raise child.failure()
-    return figures_of(options, devices, [json.loads(text) for text in said], looked)
+    return figures_of(options, devices, every, looked)
 
 
-def _said(child: Child) -> bytes:
+def said(child: Child) -> bytes:
+    """Return what a process has said once it ends.
+
+    Raises:
+        DvaSimError: nothing.
+    """
     assert child.stdout is not None
     with child.stdout as pipe:
-        return pipe.read()
+        text = pipe.read()
+    if not text:
+        child.wait()
+        raise child.failure()
+    return text
 
 
 def _part(whole: int, count: int) -> list[int]:

@@ -2,13 +2,17 @@
 
 import csv
 import math
+import subprocess
+import sys
 
 import pytest
 from helpers.processes.command_line import call
 
-from dva_sim.live.load import LoadedDva, figures_of, order_times
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.load import LoadedDva, figures_of, order_times, said
 from dva_sim.live.load_devices import LoadCounts
 from dva_sim.options.runs import LoadOptions
+from dva_sim.serving.processes import Child, end_all
 
 NOT_HERE = LoadedDva(None).look(0.0, 1.0)
 
@@ -43,6 +47,16 @@ def test_messages_are_counted_in_a_second_and_what_is_elsewhere_is_not_known():
     assert found.requests_p50_s == 0.01
     assert math.isnan(found.orders_p50_s)
     assert math.isnan(found.memory_mb)
+
+
+def test_a_process_that_ends_by_itself_is_told_with_its_last_words():
+    script = "import sys; print('error: no more files', file=sys.stderr); sys.exit(2)"
+    child = Child("load process 0", [sys.executable, "-c", script], stdout=subprocess.PIPE)
+    try:
+        with pytest.raises(DvaSimError, match="load process 0 has ended by itself: no more files"):
+            said(child)
+    finally:
+        end_all([child])
 
 
 @pytest.mark.system
