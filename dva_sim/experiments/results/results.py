@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, ValidationError
 
 from dva_sim.experiments.study.designs import MOST_RUNS
 from dva_sim.experiments.study.parts import DESIGN, REPEATS, Level
 from dva_sim.experiments.study.study import Status, Study
-from dva_sim.kernel.config import Config, Scalar, validate
+from dva_sim.kernel.config import Config, Scalar, first_mistake
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint, listed
 from dva_sim.kernel.units import unit_of
@@ -303,12 +303,20 @@ class _Manifest(Config):
 def checked_manifest(manifest: Any, file: Path) -> dict[str, Any]:
     """Return what was read as a manifest, if it has the form of one.
 
+    Keys of other versions of the program are let through.
+
     Raises:
         ConfigError: it has not.
     """
     if not isinstance(manifest, dict) or "study" not in manifest:
         raise ConfigError("is not the manifest of a study", file)
-    validate(_Manifest, manifest, lambda text, _: ConfigError(f"is damaged: {text}", file))
+    try:
+        _Manifest.model_validate(manifest)
+    except ValidationError as problems:
+        found = problems.errors(include_url=False)
+        if faults := [fault for fault in found if fault["type"] != "extra_forbidden"]:
+            text, _ = first_mistake(_Manifest, manifest, faults)
+            raise ConfigError(f"is damaged: {text}", file) from None
     return manifest
 
 

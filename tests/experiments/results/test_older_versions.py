@@ -1,5 +1,6 @@
 """Results and recordings that version 0.7.0 wrote are still read; it made `data/results-0.7.0`."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -37,6 +38,14 @@ def test_older_results_are_loaded(older):
         rows = results.runs.where(results.runs["pattern"] == pattern)
         assert rows["drive_time_s"] == pytest.approx(times)
     assert "too small to tell" in results.answer.lead
+
+
+def test_a_key_that_this_version_no_longer_knows_keeps_no_results_from_being_read(older):
+    file = older / "manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["study"]["retired"] = 8
+    file.write_text(json.dumps(manifest))
+    assert dva_sim.load(older).tables == ["events", "operators", "runs", "tracks"]
 
 
 @pytest.mark.parametrize(
