@@ -29,6 +29,10 @@ def test_a_plan_of_several_dvas_is_read_from_its_file(tmp_path):
     assert load_plan(file) == plan
 
 
+def test_no_event_goes_to_a_dva_that_was_started_again_and_forgot_its_region():
+    assert play(draw_regions(70_001)).is_clean
+
+
 def test_a_supervisor_in_a_storm_gives_a_region_back_whose_dva_was_killed():
     plan = next(p for p in map(draw_regions, range(1, 20)) if "part-3" not in p.built().dva.regions)
     killed = Fault(KILLED, 20.0, target="dva-part-1", value=30.0)

@@ -29,6 +29,7 @@ class Division:
         outside: Function that returns how far a place is outside a region [m].
         life: Number that tells this start of the DVA from others; it is part of event numbers.
         claims: Highest claim to each region that is known.
+        forgotten: Regions that a DVA had taken over and, started again, knows nothing of.
     """
 
     own: str
@@ -37,6 +38,7 @@ class Division:
     outside: Callable[[str, m.Position], float]
     life: int = 0
     claims: dict[str, Claim] = field(default_factory=dict)
+    forgotten: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         for region, line in self.lines.items():
@@ -60,6 +62,13 @@ class Division:
         """Return the id of the DVA that serves a place."""
         return self.claims[self.region_at(place)].dva
 
+    def other_at(self, place: m.Position, registry: Registry) -> str | None:
+        """Return the other DVA that serves a place and is there, or None."""
+        region = self.region_at(place)
+        dva = self.claims[region].dva
+        serves = dva != self.own and region not in self.forgotten
+        return dva if serves and self.is_there(dva, registry) else None
+
     def learn(self, region: str, claim: Claim) -> bool:
         """Note a claim; True if it is higher than the one that was known.
 
@@ -68,6 +77,8 @@ class Division:
         known = self.claims.get(region)
         if known is None or claim.dva not in self.lines[region]:
             return False
+        if claim.epoch >= known.epoch:
+            self.forgotten.discard(region)
         place = self.lines[region].index
         is_higher = (claim.epoch, -place(claim.dva)) > (known.epoch, -place(known.dva))
         if is_higher:

@@ -71,9 +71,7 @@ class RegionalDva(Dva):
             return None
         if entry.kind == PEER:
             return None
-        dva = self.division.dva_at(body.position)
-        is_there = self.division.is_there(dva, self.registry)
-        return dva if is_there and dva != self.division.own else None
+        return self.division.other_at(body.position, self.registry)
 
     def replica_of(self, event: Event, fact: int, now: float) -> tuple[str, m.Replicate] | None:
         """Return the deputy and what it has to know of an event; None if nobody has to."""

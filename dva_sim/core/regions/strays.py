@@ -65,12 +65,9 @@ class Strays:
         return self.orders.transition(event, cause, now)
 
     def _strays(self) -> Iterator[Event]:
-        own = self.division.own
-        registry = self.orders.registry
         for event in list(self.orders.events.in_state(State.PENDING, *LOOKING)):
-            dva = self.division.dva_at(event.position)
-            is_there = dva != own and self.division.is_there(dva, registry)
-            if is_there and event.number not in self.help.copies:
+            is_others = self.division.other_at(event.position, self.orders.registry) is not None
+            if is_others and event.number not in self.help.copies:
                 yield event
 
     @staticmethod

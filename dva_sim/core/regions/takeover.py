@@ -83,10 +83,15 @@ class Deputy:
         return sends
 
     def replace_restarted(self, peer: str, now: float) -> None:
-        """Claim the regions that a DVA had taken over before it was started again: it forgot."""
+        """Claim the regions that a DVA had taken over before it was started again: it forgot.
+
+        Until the deputy has claimed such a region, its events go to nobody.
+        """
         for region, claim in list(self.division.claims.items()):
-            is_deputy = self.division.deputy_of(region, self.orders.registry) == self.division.own
-            if claim.dva == peer != self.division.lines[region][0] and is_deputy:
+            if claim.dva != peer or peer == self.division.lines[region][0]:
+                continue
+            self.division.forgotten.add(region)
+            if self.division.deputy_of(region, self.orders.registry) == self.division.own:
                 self.division.learn(region, Claim(claim.epoch + 1, self.division.own))
                 self.taken_over[region] = now
                 self.orders.counters["region taken over"] += 1

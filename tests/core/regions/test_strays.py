@@ -4,6 +4,7 @@ from helpers.dva.dispatch_office import DETECTOR, GUARD, east
 from helpers.dva.two_offices import EAST, WEST, Street
 
 from dva_sim.core.events import State
+from dva_sim.core.regions.division import Claim
 from dva_sim.protocol import messages as m
 
 
@@ -29,6 +30,18 @@ def test_a_report_about_another_region_is_for_its_dva_while_that_one_is_heard():
     street.parted = True
     street.tick(12, DETECTOR)
     assert street.cores[WEST].passes_on(message) is None
+
+
+def test_a_report_is_for_no_dva_that_has_forgotten_its_region_until_it_is_claimed_again():
+    street = Street()
+    street.register(WEST, DETECTOR, "Sensor")
+    body = m.EventReport(None, "fire", east(70), 0.5, 0.9, "detected")
+    message = m.Message(WEST, 9, DETECTOR, "12:00:00", 0, body)
+    core = street.cores[WEST]
+    core.division.forgotten.add("east")
+    assert core.passes_on(message) is None
+    core.division.learn("east", Claim(2, EAST))
+    assert core.passes_on(message) == EAST
 
 
 def test_a_report_about_the_own_region_is_not_passed_on_nor_is_what_was_passed_on():
