@@ -34,6 +34,7 @@ from fuzz import mutations
 from fuzz.readers import Reader, readers
 
 MOST_CPU_S, MOST_WALL_S, MOST_MB = 5, 60, 500
+OWN_MB = 250  # of it for the mutant: a process that has run much before begins with more
 CONTROLS = {chr(n) for n in (*range(9), 11, 12, *range(14, 32), 127)}
 CONTROLS |= {chr(n) for n in (*range(0x202A, 0x202F), *range(0x2066, 0x206A))}
 PRELOADED = """
@@ -123,6 +124,7 @@ def _active_in(path: Path) -> str:
 def judge(mutant: Mutant, folder: Path) -> str:
     """Use a mutant in a child process; what is wrong, or nothing."""
     folder.mkdir()
+    most_mb = max(MOST_MB, _resident_mb() + OWN_MB)
     reading, writing = os.pipe()
     child = os.fork()
     if not child:
@@ -135,9 +137,14 @@ def judge(mutant: Mutant, folder: Path) -> str:
     if os.WIFSIGNALED(status):
         name = signal.Signals(os.WTERMSIG(status)).name
         return f"takes more than {MOST_CPU_S} s of processor, or hangs ({name})"
-    if usage.ru_maxrss > MOST_MB * 1000:
+    if usage.ru_maxrss > most_mb * 1000:
         return f"takes {usage.ru_maxrss / 1000:.0f} MB"
     return said
+
+
+def _resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
 
 
 def _waited(child: int) -> tuple[int, resource.struct_rusage]:

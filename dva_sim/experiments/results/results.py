@@ -294,7 +294,7 @@ class _Manifest(Config):
     cells: list[_Cell] = Field(default_factory=list)
     runs: Annotated[int, Field(ge=0, le=MOST_RUNS)] = 0
     versions: dict[str, str | bool | None] = Field(default_factory=dict)
-    stopped: dict[str, int | str | None] | None = None
+    stopped: dict[str, Scalar] | None = None
     failures: list[dict[str, Scalar]] = Field(default_factory=list)
     tables: dict[str, str] = Field(default_factory=dict)
     columns: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)

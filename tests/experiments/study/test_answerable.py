@@ -106,7 +106,8 @@ def test_the_only_contrast_is_the_answer_of_a_study_without_one(tmp_path):
     ]
     declared = {"question": "Which?", "factors": {"pattern": ["latest-wins", "req-rep"]}}
     facts = synthetic_results.manifest(8, 1)
-    facts["study"] = declared | {"persons": 8, "replications": 1, "seed": 1}
+    parts = facts["study"]["parts"]
+    facts["study"] = declared | {"parts": parts, "persons": 8, "replications": 1, "seed": 1}
     reading = synthetic_results.reading(tmp_path / "r", rows, facts)
     assert view_of(declared, reading.runs).contrast == ("latest-wins", "req-rep")
     assert re.search("shorter .*latest-wins.*REQ/REP.*\N{MINUS SIGN}9.9", reading.answer.lead)

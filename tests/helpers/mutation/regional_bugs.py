@@ -66,13 +66,6 @@ REGIONAL_BUGS: Final = (
         instead(lambda *_: DvaAnswer()),
     ),
     Bug(
-        "copies-not-returned",
-        "S13",
-        "a DVA that was started again does not get its events back",
-        f"{_DEPUTY}.return_copies",
-        afterwards(lambda self, sends, *_: [] if sends else None),
-    ),
-    Bug(
         "copies-not-resumed",
         "S13",
         "a deputy takes a region over, and leaves its events alone",
