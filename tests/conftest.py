@@ -7,6 +7,7 @@ from helpers.processes.search_settings import search
 from hypothesis import settings
 
 pytest_plugins = [
+    "helpers.console.one_browser",
     "helpers.processes.programs",
     "helpers.reporting.cpu_by_room",
     "helpers.reporting.left_out",

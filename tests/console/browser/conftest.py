@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from helpers.console.chromium import chromium
 from helpers.console.console_program import Addresses, addresses_of
 from helpers.processes.patience import PATIENCE_S
 from helpers.processes.programs import all_gone_after
@@ -36,13 +35,6 @@ def _own_certificates(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
         yield
-
-
-@pytest.fixture(scope="session", name="browser")  # while it runs, no other test has asyncio
-def _browser() -> Iterator[Browser]:
-    """The system's own, one for all files: these tests have a process of their own."""
-    with chromium() as browser:
-        yield browser
 
 
 class Visit:

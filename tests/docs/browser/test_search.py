@@ -10,9 +10,8 @@ from threading import Thread
 from urllib.parse import quote
 
 import pytest
-from helpers.console.chromium import chromium
 from helpers.paths import ROOT
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 from search_words import WORDS
 
 pytestmark = pytest.mark.browser
@@ -40,7 +39,9 @@ class _Quiet(SimpleHTTPRequestHandler):
 
 
 @pytest.fixture(scope="module")
-def search(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Page, str]]:
+def search(
+    browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Page, str]]:
     """A browser's page, and the address at which the built pages are searched."""
     pytest.importorskip("sphinx", reason="needs what builds the pages: make docs")
     site: Path = tmp_path_factory.mktemp("site")
@@ -48,8 +49,9 @@ def search(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Page, str
     subprocess.run(build, check=True, cwd=ROOT)
     with ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(site))) as server:
         Thread(target=server.serve_forever, daemon=True).start()
-        with chromium() as browser:
-            yield browser.new_page(), f"http://127.0.0.1:{server.server_port}/search.html?q="
+        page = browser.new_page()
+        yield page, f"http://127.0.0.1:{server.server_port}/search.html?q="
+        page.close()
         server.shutdown()
 
 
