@@ -227,6 +227,7 @@ def test_a_study_of_other_factors_and_without_an_answer_is_shown_all_the_same(tm
     facts = {
         "study": {
             "question": "How many guards?",
+            "parts": {"walk": {"scenario": "fire-drill"}},
             "persons": 3,
             "replications": 1,
             "factors": {"dispatch.policy": policies, "guard.count": [1, 2, 4]},

@@ -256,7 +256,7 @@ def write_shifts(folder: Path, shifts: int) -> Path:
     answer |= {"contrast": ["random", "min_eta"], "over": "intensity", "smallest_effect_s": 5.0}
     factors = {"dispatch.policy": policies, "intensity": rates}
     study = {"question": "Who should go?", "persons": shifts, "replications": 1}
-    study |= {"factors": factors, "answer": answer}
+    study |= {"factors": factors, "answer": answer, "parts": {"shift": {"scenario": "busy-shift"}}}
     scenarios = {"shift": build(SHIFT).model_dump(mode="json")}
     return write(folder, tables, {"study": study, "scenarios": scenarios, "set": []})
 
