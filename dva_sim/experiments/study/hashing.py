@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import subprocess
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -50,10 +51,17 @@ def input_names(scenarios: Iterable[Config], others: Iterable[str] = ()) -> list
 
 
 def hashes_of(names: Iterable[str]) -> dict[str, str]:
-    """Return 64 bits over the contents of each of the `files_of` these names."""
-    return {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for name, path in files_of(names)
-    }
+    """Return 64 bits over the contents of each of the `files_of` these names, wherever they lie."""
+    contents: dict[str, bytes] = defaultdict(bytes)
+    for name, path in files_of(names):
+        contents[_placeless(name)] += path.read_bytes()
+    return {name: hashlib.sha256(data).hexdigest()[:16] for name, data in contents.items()}
+
+
+def _placeless(name: str) -> str:
+    """Return a name without the folder of an absolute path: results are alike on all machines."""
+    path = Path(file_in(name.partition(": ")[0]))
+    return name.removeprefix(f"{path.parent}/") if path.is_absolute() else name
 
 
 def files_of(names: Iterable[str]) -> Iterator[tuple[str, Path]]:

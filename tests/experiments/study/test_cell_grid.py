@@ -92,6 +92,19 @@ def inputs_of(study):
     return inputs(cell.scenario for cell in cell_grid.cells(study))
 
 
+def test_files_of_one_name_in_two_folders_are_both_known_by_their_contents(tmp_path):
+    names = []
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+        file = tmp_path / folder / "cell.up"
+        file.write_text(folder)
+        names.append(str(file))
+    before = inputs((), names)
+    file.write_text("c")
+    assert list(before) == ["cell.up"]
+    assert inputs((), names) != before
+
+
 def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
     trace = tmp_path / "cell.up"
     study = study_in(tmp_path, f"link.trace_up={trace}")
@@ -99,7 +112,7 @@ def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
     found = []
     for text in ("1\n2\n", "1\n3\n"):
         trace.write_text(text)
-        found.append(inputs_of(study)[str(trace)])
+        found.append(inputs_of(study)[trace.name])
     assert found[0] != found[1]
 
 

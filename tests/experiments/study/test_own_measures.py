@@ -60,7 +60,7 @@ def test_results_are_read_without_the_file_and_say_what_it_said(tmp_path):
     run_study(study, tmp_path / "out", jobs=1)
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
     assert manifest["columns"]["runs"]["standing_s"]["title"] == "time standing"
-    assert [name for name in manifest["inputs"] if name.endswith("mine.py:Mine")]
+    assert "mine.py:Mine" in manifest["inputs"]  # wherever it lies
     (tmp_path / "mine.py").write_text("raise SystemExit('read from a results folder')\n")
     assert "time standing" in words_of(tmp_path / "out")
 
