@@ -461,7 +461,7 @@ def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> En
 
 
 def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Send so many requests a second as an intruder: of all kinds, or of one."""
+    """Send requests at a rate as an intruder: of all kinds, or of one."""
     to = storm.id_of(fault.target)
     goes = [True]
     clock = storm.run.clock
@@ -477,7 +477,7 @@ def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _flood_in_doubt(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Order a robot about as an intruder so many times a second, unheard by the DVA."""
+    """Send a robot orders at a rate as an intruder; the DVA does not hear of them."""
     robot = storm.id_of(fault.target)
     goes = [True]
     rules = storm.interference.rules

@@ -289,7 +289,7 @@ class _Trial:
         self.parts = (*links, *robots, self._after_the_end)
 
     def _drive(self, delay: float, loss: float = 0.0, **of_drive: Any) -> TriedDrive:
-        """Return a drive that has just begun, over links of so many seconds and losses."""
+        """Return a drive that has just begun, over links of this delay [s] and loss."""
         config = LinkConfig(delay_s=delay, loss=loss)
         links: dict[tuple[str, str], Link] = {}
 

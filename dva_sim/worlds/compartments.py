@@ -177,7 +177,7 @@ def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
 
 
 def _cuts(length: int, across: float) -> list[int]:
-    """Return where a side of so many cells is cut into blocks of equal length, about `across`."""
+    """Return where `length` cells are cut into blocks of equal length, about `across`."""
     blocks = max(1, round(length / across))
     return [round(length * number / blocks) for number in range(blocks + 1)]
 

@@ -372,7 +372,7 @@ def _scatter(
     drawn: Sequence[Pose] = (),
     others: Sequence[Pose] = (),
 ) -> tuple[Pose, ...]:
-    """Return so many more places than are drawn, apart from all; each has its own stream.
+    """Return the places that are missing from `count`, apart from all others, each by its stream.
 
     Raises:
         ConfigError: not so many fit.

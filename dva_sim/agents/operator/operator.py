@@ -1,9 +1,9 @@
 """An operator at work: takes an order, gets permission, drives or supervises, reports, is free.
 
-An operator handles so many orders at once, with one robot for each. The newest order holds: it
-takes the place of an older one of the same robot, or of the oldest where the hands are full; a
-robot that was on its way is stopped first. Robots that do missions are watched all at once; of
-those that are driven, all but one stand until it is their turn.
+An operator handles a limited number of orders at once, each with its own robot. The newest order
+holds: it takes the place of an older one of the same robot, or of the oldest at the limit; a robot
+that was on its way is stopped first. Robots on missions are watched all at once; of those that are
+driven, all but one stand until it is their turn.
 """
 
 from __future__ import annotations

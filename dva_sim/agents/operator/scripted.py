@@ -149,7 +149,7 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
 def _drive(
     operator: ScriptedOperator, robot: str, session: int, commands: int
 ) -> Generator[Ask | Pause, m.Reply | None, bool]:
-    """Start, and send so many commands.
+    """Start the robot, and send `commands` commands.
 
     False if the robot cannot be started, or obeys no more.
     """

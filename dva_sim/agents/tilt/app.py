@@ -97,7 +97,7 @@ class Trail:
         self._filter.add((hand, hand))
 
     def sample(self, count: int, decay: float) -> None:
-        """Take so many samples; from each to the next the hand keeps the share `decay`."""
+        """Take `count` samples; from each to the next the hand keeps the share `decay`."""
         asked = self._asked
         hand = self._hand
         add = self._filter.add

@@ -39,7 +39,7 @@ class PlayedRun(Protocol):
 
     @property
     def field(self) -> Field:
-        """All bodies and their positions."""
+        """Positions of all bodies."""
 
     @property
     def links(self) -> Mapping[str, tuple[Link, Link]]:

@@ -88,7 +88,7 @@ class AuditPages:
 
 
 def rows_of(path: Path, after: int = 0, most: int | None = None) -> list[AuditRow]:
-    """Return the rows after a number, so many of them.
+    """Return the rows after a number, at most `most` of them.
 
     Raises:
         ConfigError: the file holds none, or what no log writes.

@@ -67,7 +67,7 @@ class IntervalLaw:
         return self._critical(persons) * self.spread / math.sqrt(persons)
 
     def power(self, effect: float, persons: int) -> float:
-        """Return the chance that the interval of so many lies beyond zero if the mean is `effect`.
+        """Return the chance that an interval over `persons` lies beyond zero at a mean of `effect`.
 
         Beyond zero means on the side of the effect; the other side does not count.
 

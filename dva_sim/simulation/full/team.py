@@ -200,7 +200,7 @@ class TeamBuilder:
         return guard
 
     def _played(self, device: AgentDevice, walker: Walker, legs: Walking) -> PersonGuard:
-        """Return a guard whom a person plays; nobody does as yet."""
+        """Return a guard that a person can take over and play."""
         guard = PersonGuard(
             device,
             walker,

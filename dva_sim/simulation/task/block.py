@@ -178,7 +178,7 @@ def seat_of(scenario: TaskScenario) -> Seat:
 
 
 def practised(person: Person, number: int) -> Person:
-    """Return the person after so many trials: quicker by the power law of practice.
+    """Return the person after `number` trials: quicker by the power law of practice.
 
     References:
         A. Newell, P. S. Rosenbloom: Mechanisms of skill acquisition and the law of practice, 1981.

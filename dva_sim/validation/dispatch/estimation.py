@@ -162,7 +162,7 @@ def _rounding(exact: float) -> float:
 
 @cache
 def _errors_allowed(batches: int) -> float:
-    """Return standard errors that a right estimate from so many batches may be off."""
+    """Return by how many standard errors a correct estimate from `batches` may be off."""
     if not 1 < batches < MANY:
         return ERRORS
     from scipy import special

@@ -33,7 +33,7 @@ Flags = NDArray[np.bool_]
 
 
 def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
-    """Yield cases turned and reordered: a choice hangs on neither north nor lists.
+    """Yield cases turned and reordered: neither north nor the order of a list may matter.
 
     How often each chooses otherwise once a place is turned and its team shuffled.
     """

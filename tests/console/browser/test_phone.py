@@ -86,7 +86,7 @@ def test_the_dissertations_app_names_its_pattern_and_tells_a_steady_tilt_from_a_
     hand.start()
     hand.tilt(FORWARDS)
     hand.speed("0.20")
-    expect(hand.status("Doing")).to_contain_text("This pipeline sends a steady tilt once")
+    expect(hand.status("Doing")).to_contain_text("This pipeline sends a steady tilt only once")
     expect(hand.status("Link")).to_contain_text("ms")
     hand.tap("Stop")
     hand.speed("0.00")

@@ -9,18 +9,22 @@ from dva_sim.core.events import State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.scenario import build, load
 
+TWO_GUARDS = {
+    "client": "g1",
+    "guard__kind": {2: "person"},
+    "guard__mobilisation_s": 3000,
+    "robot__count": 0,
+    "bystander__count": 0,
+    "events": FIRE,
+}
+
 
 @pytest.fixture
 def page(monkeypatch):
     """Two guards, the second of them a person's, nobody else who could go, and a fire."""
     return PhonePage(
         monkeypatch,
-        client="g1",
-        guard__kind={2: "person"},
-        guard__mobilisation_s=3000,
-        robot__count=0,
-        bystander__count=0,
-        events=FIRE,
+        **TWO_GUARDS,
         dispatch__policy="nearest_idle",
     )
 
@@ -249,12 +253,7 @@ def own_way(monkeypatch):
     """A guard whom a person plays, where Ana is asked about every event first."""
     page = PhonePage(
         monkeypatch,
-        client="g1",
-        guard__kind={2: "person"},
-        guard__mobilisation_s=3000,
-        robot__count=0,
-        bystander__count=0,
-        events=FIRE,
+        **TWO_GUARDS,
         dispatch__mode="ask_first",
         dispatch__decide_within_s=6000,
     )

@@ -196,7 +196,7 @@ class Adaptive(Strategy):
         return delay / (self._habits.driven * self.person.waits_from)
 
     def _waiting(self, way: float, moves: float, delay: float) -> float:
-        """Return the expected time to finish by so many moves, each with its wait [s]."""
+        """Return the expected time to finish in a number of moves, each with its wait [s]."""
         a_move = max(self._habits.shortest_s, self.period.value)
         return way / self._most + moves * (a_move + self._moves.moves.usual_wait(delay))
 

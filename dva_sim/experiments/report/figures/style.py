@@ -120,7 +120,7 @@ def panels(
 def places(
     count: int, abreast: int, height: float, **options: Any
 ) -> tuple[Figure, list[list[Axes]], list[Axes]]:
-    """Return axes for so many panels, some abreast: the grid, and the panels that are seen."""
+    """Return axes for `count` panels, `abreast` in a row: figure, grid, and visible panels."""
     figure, grid = panels(-(-count // abreast), abreast, height, **options)
     flat = [ax for row in grid for ax in row]
     for ax in flat[count:]:

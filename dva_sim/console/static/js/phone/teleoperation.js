@@ -113,7 +113,7 @@ function Hint({ one }) {
   }
   const why = rowOf(one.i)?.stop_reason;
   if (!why) return 'Driving. Swipe down to stop.';
-  const steady = why.startsWith('no command') && !repeats() ? ' This pipeline sends a steady tilt once: tilt anew.' : '';
+  const steady = why.startsWith('no command') && !repeats() ? ' This pipeline sends a steady tilt only once: move the phone.' : '';
   return `Stopped: ${why}.${steady}`;
 }
 
