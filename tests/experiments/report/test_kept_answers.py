@@ -101,7 +101,7 @@ def test_what_a_study_asks_for_otherwise_is_named_before_any_run(kept, tmp_path)
     assert changed(before, "robot.processing_s=0.3") == "a scenario"
     assert changed(json.loads(json.dumps(traced)), with_trace) == ""
     trace.write_text("1\n3\n")
-    assert changed(json.loads(json.dumps(traced)), with_trace) == str(trace)
+    assert changed(json.loads(json.dumps(traced)), with_trace) == trace.name
     text, is_stale = command._described(answer, {}, "a scenario")
     assert is_stale
     assert "a scenario has changed" in text
