@@ -1,10 +1,13 @@
 """Missions by hand, on the phone and on the driving page."""
 
+import json
 from collections.abc import Iterator
 
 import pytest
 from helpers.console.browser_phone import Hand
+from helpers.console.changed_lines import sockets_of
 from helpers.console.console_program import PHONES, Addresses
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
 WORDS = *PHONES, "--set=guard.kind=person"
@@ -94,10 +97,28 @@ def test_sensors_are_read_while_driving_beside_the_picture(hand):
 
 
 def test_the_driving_page_reads_sensors_of_a_robot_in_hand(running, visit):
-    page = visit.open(running.drive, "drive")
+    lines, silent = list[str](), [True]
+
+    def before(text: str) -> str:
+        """Return a line of a console that has not yet done what was asked."""
+        line = json.loads(text)
+        for drive in line.get("drives", ()) if silent else ():
+            lines.append(text)
+            for sensor in drive.get("sensors", ()):
+                sensor |= {"rate_hz": None, "age_s": None}
+        return json.dumps(line)
+
+    page = visit.context.new_page()
+    sockets_of(page, "", before)
+    page.goto(f"{running.drive}#/drive")
     page.get_by_role("button", name="Take control").click()
     page.get_by_text("Choose sensors").click()
-    page.get_by_label("Smoke", exact=True).check()
+    lines.clear()
+    smoke = page.get_by_label("Smoke", exact=True)
+    smoke.check()  # and stays so, though the console has not said so yet
+    assert becomes(lambda: (page.wait_for_timeout(50), len(lines) > 5)[1])
+    expect(smoke).to_be_checked()
+    silent.clear()
     region = page.get_by_role("region", name="Sensors of robot-1")
     expect(region.get_by_role("listitem")).to_contain_text("alarm from")
     page.get_by_role("button", name="Release control").click()

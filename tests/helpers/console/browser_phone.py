@@ -117,7 +117,15 @@ class Hand:
         expect(self.page.get_by_text("is in your hands")).to_be_visible()
 
     def start(self) -> None:
+        """Start to drive, again after a refusal because the machine is still busy with the page."""
         self.tap("Start")
+        stop = self.page.get_by_role("button", name="Stop", exact=True, disabled=False)
+        late = self.page.get_by_role("alert").filter(has_text="cannot keep up with real time")
+        expect(stop.or_(late)).to_be_visible()
+        if late.count():
+            late.get_by_role("button", name="Dismiss").tap()
+            expect(self.status("Doing")).not_to_contain_text("behind real time")
+            self.tap("Start")
         self.is_driving()
 
     def is_driving(self, driving: bool = True) -> None:

@@ -3,6 +3,7 @@ import { html, useState } from '../../vendor/preact.js';
 import { driveOf, maySteer, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { Choice, Tick } from '../ui/fields.js';
+import { useRequested } from '../ui/requested.js';
 import { unitText, valueText } from '../ui/sensor_text.js';
 import { capital, plain } from '../ui/words.js';
 
@@ -16,17 +17,13 @@ export function Sensing({ robot }) {
   void seat.value;
   const sensors = driveOf(robot.i)?.sensors ?? [];
   const read = sensors.filter((one) => one.rate_hz !== null);
-  const [asked, setAsked] = useState(/** @type {string[] | null} */ (null));
   const [rate, setRate] = useState(String(read[0]?.rate_hz ?? 1));
+  const sense = (/** @type {string[]} */ names, hz = rate) =>
+    act('sense', { robot: robot.i, sensors: names, rate_hz: Number(hz) });
+  const [names, choose] = useRequested(read.map((one) => one.name), sense, (chosen) => [...chosen].sort().join());
   if (!sensors.length || !maySteer.value) return null;
-  const sense = async (/** @type {string[]} */ names, hz = rate) => {
-    setAsked(names); // shown until the console has them
-    await act('sense', { robot: robot.i, sensors: names, rate_hz: Number(hz) });
-    setAsked(null);
-  };
-  const names = asked ?? read.map((one) => one.name);
   const tick = (/** @type {string} */ name, /** @type {boolean} */ on) =>
-    sense(on ? [...names, name] : names.filter((one) => one !== name));
+    choose(on ? [...names, name] : names.filter((one) => one !== name));
   const pace = (/** @type {string} */ hz) => {
     setRate(hz);
     if (names.length) sense(names, hz);

@@ -3,6 +3,7 @@ import { html, signal, useEffect } from '../../vendor/preact.js';
 import { connection, mayDispatch, maySteer } from '../store.js';
 import { act, ask } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
+import { useRequested } from '../ui/requested.js';
 import { ageText, capital, plain } from '../ui/words.js';
 
 /** @typedef {import('../lines.js').Details} Details */
@@ -40,18 +41,24 @@ export function Instructions({ event, details }) {
   if (!lines.length) return null;
   const steps = lines.filter((line) => line.step !== null);
   const off = !mayDispatch.value || !maySteer.value;
-  const tick = async (/** @type {number | null} */ step, /** @type {boolean} */ done) => {
-    await act('event_tick', { event, step, done });
-    load(event);
-  };
   return html`<details class="instructions" open><summary>Instructions
     (${steps.filter((line) => line.done).length} of ${steps.length} done)</summary>
     ${lines.map((line, place) => line.step === null
       ? html`<p key=${place}>${line.text}</p>`
-      : html`<label key=${place} class="tick"><input type="checkbox" checked=${Boolean(line.done)} disabled=${off}
-          onInput=${(/** @type {any} */ typed) => tick(line.step, typed.currentTarget.checked)} />
-          <span>${line.text}${line.done && html` <small>${line.done.label}, ${ageText(ageOf(line.done.at_ms))} ago</small>`}</span></label>`)}
+      : html`<${Instruction} key=${place} event=${event} line=${line} off=${off} />`)}
   </details>`;
+}
+
+/** @param {{event: number, line: Details['instructions'][number], off: boolean}} props */
+function Instruction({ event, line, off }) {
+  const [done, tick] = useRequested(Boolean(line.done), async (wanted) => {
+    const answer = await act('event_tick', { event, step: line.step, done: wanted });
+    load(event);
+    return answer;
+  });
+  return html`<label class="tick"><input type="checkbox" checked=${done} disabled=${off}
+    onInput=${(/** @type {any} */ typed) => tick(typed.currentTarget.checked)} />
+    <span>${line.text}${line.done && html` <small>${line.done.label}, ${ageText(ageOf(line.done.at_ms))} ago</small>`}</span></label>`;
 }
 
 /** Steps in the order of their times. @param {{details: Details | null, numbered?: boolean}} props */

@@ -1,8 +1,9 @@
 /** Switches that inject faults into a robot; switching a fault off undoes it. */
-import { html, useEffect, useState } from '../../vendor/preact.js';
+import { html, useState } from '../../vendor/preact.js';
 import { MOST_PROCESSING_S } from '../declared.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
+import { useRequested } from '../ui/requested.js';
 import { Slider } from '../ui/slider.js';
 import { plain } from '../ui/words.js';
 import { windowOf } from './window.js';
@@ -33,27 +34,9 @@ export function Faults({ robot }) {
 
 /** @param {{name: string, hint: string, on: boolean, ask: object}} props */
 function Knob({ name, hint, on, ask }) {
-  const [shown, change] = useAsked(on, (wanted) => act('fault', { ...ask, on: wanted }));
+  const [shown, change] = useRequested(on, (wanted) => act('fault', { ...ask, on: wanted }));
   return html`<label class="tick" title=${hint}><input type="checkbox" checked=${shown} disabled=${!maySteer.value}
     onInput=${(/** @type {any} */ event) => change(event.currentTarget.checked)} /> ${name}</label>`;
-}
-
-/**
- * State of a switch: the requested one until the simulation reports it or refuses, else the reported one.
- * @param {boolean} reported
- * @param {(wanted: boolean) => Promise<import('../types.js').Answer>} ask
- * @returns {[boolean, (wanted: boolean) => void]}
- */
-function useAsked(reported, ask) {
-  const [asked, set] = useState(/** @type {boolean | null} */ (null));
-  useEffect(() => {
-    if (asked === reported) set(null);
-  }, [asked, reported]);
-  const change = (/** @type {boolean} */ wanted) => {
-    set(wanted);
-    ask(wanted).then((done) => !done.ok && set(null));
-  };
-  return [asked ?? reported, change];
 }
 
 /** @param {{robot: Thing}} props */
@@ -62,7 +45,7 @@ function Processing({ robot }) {
   const [own, set] = useState(MOST_PROCESSING_S);
   const ask = (/** @type {boolean} */ on, seconds = own) =>
     act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
-  const [isSlow, slow] = useAsked(reported !== null, (on) => ask(on));
+  const [isSlow, slow] = useRequested(reported !== null, (on) => ask(on));
   const change = (/** @type {number} */ seconds) => {
     set(seconds);
     if (reported !== null) ask(true, seconds);
