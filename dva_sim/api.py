@@ -112,11 +112,11 @@ def replay(options: ReplayOptions) -> Episode:
     from dva_sim.live.recorded_lines import readable  # late: start-up
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
-    wanted = Wanted.of(options)
-    bag, kept = (None if to is None else Path(to) for to in (options.ros2, options.mcap))
-    with readable(Path(options.file), kept) as found:
-        opened = open_recording(found, wanted)
-        list(write_replay(opened, wanted, bag))
+    pictures = Wanted.of(options)
+    bag, recording_copy = (None if to is None else Path(to) for to in (options.ros2, options.mcap))
+    with readable(Path(options.file), recording_copy) as recording:
+        opened = open_recording(recording, pictures)
+        list(write_replay(opened, pictures, bag))
     return episode_of(opened.playback.scenario, opened.playback.seed, opened.tables or {})
 
 
@@ -180,11 +180,11 @@ def register(options: RegisterOptions) -> Preregistration:
     from dva_sim.experiments.study import registration  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
-    asked = open_study(options.study, version="full" if options.full else None)
-    registration.register(asked, options.again)
-    found = registration.registration_of(asked)
-    assert found is not None
-    return found
+    study = open_study(options.study, version="full" if options.full else None)
+    registration.register(study, options.again)
+    registered = registration.registration_of(study)
+    assert registered is not None
+    return registered
 
 
 @_with(TuneOptions)
@@ -198,10 +198,10 @@ def tune(options: TuneOptions) -> TunedValues:
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
     from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned  # late: start-up
 
-    asked = open_study(options.study)
+    study = open_study(options.study)
     folder = Path(options.out or folder_of_tuning(str(options.study)))
-    tuned = trials.tune(asked, folder, jobs=options.jobs, progress=options.progress)
-    save_tuned(asked, tuned)
+    tuned = trials.tune(study, folder, jobs=options.jobs, progress=options.progress)
+    save_tuned(study, tuned)
     return tuned
 
 

@@ -123,7 +123,9 @@ class AgentDevice:
 
     def call(self, label: str) -> None:
         """Give it another label, which can be told apart from those of all others here."""
-        others = [known for id_tag, known in self.labels.items() if id_tag != self.id_tag]
+        others = [
+            label_there for id_tag, label_there in self.labels.items() if id_tag != self.id_tag
+        ]
         self.label = self.labels[self.id_tag] = distinct(label, self.id_tag, others)
 
     def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
@@ -392,10 +394,10 @@ class AgentDevice:
 
     def take(self, request: Request, handler: Handler) -> None:
         """Answer a request: by what was answered before, by a refusal, or by `handler`."""
-        known = self._replies.get(key_of(request.sender, request.data))
-        message = self.admit(request) if known is None else None
-        if known is not None:
-            request.answer(known)
+        reply = self._replies.get(key_of(request.sender, request.data))
+        message = self.admit(request) if reply is None else None
+        if reply is not None:
+            request.answer(reply)
         elif message is not None:
             self.conclude(request, message, handler)
 

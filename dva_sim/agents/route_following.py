@@ -133,7 +133,7 @@ class _Line:
         at = self.at
         legs = self.legs
         nearest = math.inf
-        found = (last.leg, 0.0, math.inf, 0.0)
+        best = (last.leg, 0.0, math.inf, 0.0)
         end = last.along + reach + BENT * math.hypot(x - last.x, y - last.y)
         i = last.leg
         count = len(legs)
@@ -152,7 +152,7 @@ class _Line:
             far = away_x * away_x + away_y * away_y
             if far < nearest:
                 nearest = far
-                found = (i, along, away_x, away_y)
+                best = (i, along, away_x, away_y)
                 away = along + AWAY * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
                 until = bisect_right(self._turned, self._turned[i] + BEND, i)
                 i += 1
@@ -161,7 +161,7 @@ class _Line:
                 i = bisect_right(at, along + farther, i + 2) - 1
             if at[i] > away and i < until:
                 i = until
-        leg, along, away_x, away_y = found
+        leg, along, away_x, away_y = best
         return _Place(leg, along, x, y, offset=math.hypot(away_x, away_y))
 
 
@@ -339,8 +339,8 @@ class PurePursuit:
         seen = view.seen
         habits = self._steering_habits
         delay = view.delay if view.delay > SHORTEST else SHORTEST
-        wanted = person.pace * reach.speed
-        look = wanted * delay / person.caution
+        pace = person.pace * reach.speed
+        look = pace * delay / person.caution
         nearest = habits.nearest_look_m
         farthest = habits.farthest_look_m
         look = look if look > nearest else nearest
@@ -356,7 +356,7 @@ class PurePursuit:
             return reach.turn(self._clamp(gain * ahead.bearing))
         speed = person.caution * look / delay
         slow = ahead.remaining / (2.0 * delay + 1.0)
-        speed = speed if speed < wanted else wanted
+        speed = speed if speed < pace else pace
         return self._along(route, view, ahead, look, speed if speed < slow else slow)
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:

@@ -132,14 +132,14 @@ async def _close_when(ended: asyncio.Event, streams: CameraStreams) -> None:
     streams.close()
 
 
-def main(given: Sequence[str] | None = None) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Draw and serve until the run has ended."""
     parser = argparse.ArgumentParser(prog="dva_sim.cameras", description=__doc__)
     parser.add_argument("--fd", type=int, required=True, help="socket to the run")
     parser.add_argument("--listen-fd", type=int, required=True, help="listening socket")
     parser.add_argument("--host", required=True, help="host that it listens on")
     parser.add_argument("--labels", type=json.loads, required=True, help="of the robots, as JSON")
-    options = parser.parse_args(given)
+    options = parser.parse_args(words)
     # Ctrl-C may reach all processes; the run says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)

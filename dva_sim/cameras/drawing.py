@@ -94,12 +94,12 @@ class Eyes:
         if ("smoke" if what == "layer" else what) not in self._shown:
             return None
         tick = math.floor(time / AIR_S) * AIR_S
-        known = self._air.get(what)
-        if known is None or known[0] != tick:
+        drawn = self._air.get(what)
+        if drawn is None or drawn[0] != tick:
             raster = self._surroundings.raster(what, tick)
-            known = tick, raster if float(raster.values.max(initial=0.0)) > HAZE else None
-            self._air[what] = known
-        return known[1]
+            drawn = tick, raster if float(raster.values.max(initial=0.0)) > HAZE else None
+            self._air[what] = drawn
+        return drawn[1]
 
 
 def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:

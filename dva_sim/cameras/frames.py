@@ -59,10 +59,10 @@ class Unpacker:
         self._rest += data
         pictures = []
         while len(self._rest) >= 4 + len(MAGIC):
-            found = self._first()
-            if found is None:
+            first = self._first()
+            if first is None:
                 break
-            picture, used = found
+            picture, used = first
             del self._rest[:used]
             if picture is not None:
                 pictures.append(picture)

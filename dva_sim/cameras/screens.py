@@ -97,10 +97,10 @@ class Screens:
             return
         tick = frame.observation.tick
         now = self._run.clock.now
-        known = taken.get(tick)
-        if known is None:
+        entry = taken.get(tick)
+        if entry is None:
             return
-        number, figures = known
+        number, figures = entry
         while next(iter(taken)) != tick:
             taken.popitem(last=False)
         seen = frame.observation
@@ -116,10 +116,10 @@ class Screens:
         self._tell(line, self._numbers[robot])
 
     def _subscribe(self) -> None:
-        wanted = self._watched - self._held
-        for robot in self._subscribed.keys() - wanted:
+        robots = self._watched - self._held
+        for robot in self._subscribed.keys() - robots:
             self._subscribed.pop(robot).close()
-        for robot in sorted(wanted - self._subscribed.keys()):
+        for robot in sorted(robots - self._subscribed.keys()):
             arrived = partial(self.arrived, robot)
             self._subscribed[robot] = self._run.network.subscribe(
                 self._screen, robot, FRAME, arrived

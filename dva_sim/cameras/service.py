@@ -52,8 +52,8 @@ class CameraService:
         self._clock = clock
         self._tell = tell
         self._host = host
-        shown = f"[{host}]" if ":" in host else host
-        self.base = f"http://{shown}:{self._listener.getsockname()[1]}/"
+        host_text = f"[{host}]" if ":" in host else host
+        self.base = f"http://{host_text}:{self._listener.getsockname()[1]}/"
         self._run: FilmedRun | None = None
         self._labels: list[str] = []
         self._child: PipedChild | None = None

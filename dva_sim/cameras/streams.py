@@ -146,11 +146,11 @@ class CameraStreams:
         """Yield pictures as parts of a response, each newer than the one before."""
         try:
             yield f"--{BOUNDARY}\r\n".encode()
-            shown: Picture | None = None
-            while (picture := await self._after(viewer, shown)) is not None:
-                if shown is not None and picture.number > shown.number + 1:
-                    self.skipped += picture.number - shown.number - 1
-                shown = picture
+            last: Picture | None = None
+            while (picture := await self._after(viewer, last)) is not None:
+                if last is not None and picture.number > last.number + 1:
+                    self.skipped += picture.number - last.number - 1
+                last = picture
                 yield part(picture)
         finally:
             self.leave(viewer)
@@ -158,11 +158,11 @@ class CameraStreams:
     async def one(self, viewer: Viewer) -> Picture | None:
         """Return the newest picture; None if there is none for too long."""
         try:
-            known = self._newest.get(viewer.robot)
-            if known is not None and time.monotonic() - known[1] < FRESH:
-                return known[0]
+            newest = self._newest.get(viewer.robot)
+            if newest is not None and time.monotonic() - newest[1] < FRESH:
+                return newest[0]
             async with asyncio.timeout(ONE_WITHIN if self.draws else 0.0):
-                return await self._after(viewer, known[0] if known else None)
+                return await self._after(viewer, newest[0] if newest else None)
         except TimeoutError:
             return None
         finally:

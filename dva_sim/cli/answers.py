@@ -77,8 +77,10 @@ def _compare(folder: Path, studies: Sequence[str], mark: bool, jobs: int | None)
 
     kept = [a for a in kept_answers.all_kept(folder) if not studies or a.study in studies]
     if missing := [name for name in studies if name not in {answer.study for answer in kept}]:
-        known = [answer.study for answer in kept_answers.all_kept(folder)]
-        raise ConfigError(f"no answer of {missing[0]!r} is kept; {hint(missing[0], known, 'kept')}")
+        kept_names = [answer.study for answer in kept_answers.all_kept(folder)]
+        raise ConfigError(
+            f"no answer of {missing[0]!r} is kept; {hint(missing[0], kept_names, 'kept')}"
+        )
     others = {answer.study: _changed(answer.study, folder) for answer in kept}
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK

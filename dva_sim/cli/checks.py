@@ -106,8 +106,8 @@ def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -
 
 def _sum_up(one: str, many: str, codes: Sequence[ExitCode]) -> ExitCode:
     count = Counter(codes)
-    found = ", ".join(f"{count[code]} {word}" for code, word in WORDS.items() if count[code])
-    print(f"{len(codes)} {one if len(codes) == 1 else many}: {found}")
+    counts = ", ".join(f"{count[code]} {word}" for code, word in WORDS.items() if count[code])
+    print(f"{len(codes)} {one if len(codes) == 1 else many}: {counts}")
     return max(codes, key=list(WORDS).index, default=VALID)
 
 
@@ -137,9 +137,9 @@ def _check_one(name: str) -> ExitCode:
         _say("; ".join((f"{name}: {verdict.kind}: {WORDS[code]}", *words)))
         return code
     more = f", the first {_SHOWN} shown" if number > _SHOWN else ""
-    found = [f"{number} problem{'s'[: number > 1]}{more}"] if number else []
-    found += [f"breaks {broken} safety rule{'s'[: broken > 1]}"] if broken else []
-    _say(f"{name}: {verdict.kind}: invalid, {', '.join(found)}")
+    faults = [f"{number} problem{'s'[: number > 1]}{more}"] if number else []
+    faults += [f"breaks {broken} safety rule{'s'[: broken > 1]}"] if broken else []
+    _say(f"{name}: {verdict.kind}: invalid, {', '.join(faults)}")
     return INVALID
 
 

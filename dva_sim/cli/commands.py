@@ -49,17 +49,17 @@ class CommandWithExamples(TyperCommand):
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Write options, then what has to be given, and in brackets what may be."""
-        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
-        names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in given]
+        arguments = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
+        names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in arguments]
         return ["[OPTIONS]", *names]
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write arguments by the words of the usage, then options."""
-        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
-        if given:
+        arguments = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
+        if arguments:
             with formatter.section("Arguments"):
-                formatter.write_dl([(name_of(p), getattr(p, "help", "")) for p in given])
-        records = [p.get_help_record(ctx) for p in self.get_params(ctx) if p not in given]
+                formatter.write_dl([(name_of(p), getattr(p, "help", "")) for p in arguments])
+        records = [p.get_help_record(ctx) for p in self.get_params(ctx) if p not in arguments]
         with formatter.section("Options"):
             formatter.write_dl([record for record in records if record is not None])
 

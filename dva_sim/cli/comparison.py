@@ -85,8 +85,8 @@ def tell(
             console.print(failed, style="yellow", soft_wrap=True)
     lines = (*_questions(comparison), *_cells(comparison), _random_numbers(comparison))
     print_lines(map(escape, lines), console)
-    wanted: Sequence[str | None] = measures or [None]
-    for measure in wanted:
+    names: Sequence[str | None] = measures or [None]
+    for measure in names:
         table, column = comparison.find(measure)
         name = column if table == "runs" else f"{table}.{column}"
         _differences(name, comparison.differences(f"{table}.{column}", by), console)
@@ -114,10 +114,13 @@ def _verdict(verdict: GateVerdict) -> str:
 
 def _questions(comparison: Comparison) -> list[str]:
     """Return the questions of two studies, if they differ."""
-    asked = [side.question for side in comparison.sides]
-    if asked[0] == asked[1]:
+    questions = [side.question for side in comparison.sides]
+    if questions[0] == questions[1]:
         return []
-    return ["Two different studies:", *(f"  {n}: {q}" for n, q in zip("AB", asked, strict=True))]
+    return [
+        "Two different studies:",
+        *(f"  {n}: {q}" for n, q in zip("AB", questions, strict=True)),
+    ]
 
 
 def _cells(comparison: Comparison) -> list[str]:
@@ -144,20 +147,20 @@ def _random_numbers(comparison: Comparison) -> str:
     return f"Compared in pairs of the same person, trial and seed: {share} runs of A"
 
 
-def _differences(name: str, found: Sequence[Difference], console: Console) -> None:
+def _differences(name: str, differences: Sequence[Difference], console: Console) -> None:
     unit = f" [{unit_of(name)}]" if unit_of(name) else ""
     console.print(f"\n[bold]{escape(f'{name}{unit}')}[/bold]")
-    factors = list(dict.fromkeys(factor for row in found for factor, _ in row.levels))
+    factors = list(dict.fromkeys(factor for row in differences for factor, _ in row.levels))
     heads = ["part", *map(factor_name, factors), "runs A", "runs B", "median A", "median B"]
-    rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in found]
+    rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in differences]
     print_table([*heads, "B - A, mean (95 % interval)"], rows, console, 1 + len(factors))
-    if not all(row.is_identical for row in found):
+    if not all(row.is_identical for row in differences):
         text = "B - A is the mean over persons, not the difference of the medians beside it"
         console.print(text, style="dim", soft_wrap=True)
-    clear = sum(row.differs_from_zero for row in found)
+    clear = sum(row.differs_from_zero for row in differences)
     if clear:
         console.print(
-            f"{_MARK} excludes zero, each interval on its own: {clear} of {len(found)}; of "
+            f"{_MARK} excludes zero, each interval on its own: {clear} of {len(differences)}; of "
             "those that did not change, one in 20 would by chance",
             style="dim",
             soft_wrap=True,
@@ -165,8 +168,11 @@ def _differences(name: str, found: Sequence[Difference], console: Console) -> No
 
 
 def _names(levels: Levels, factors: Sequence[str]) -> list[str]:
-    given = dict(levels)
-    return [level_name(factor, given[factor]) if factor in given else "" for factor in factors]
+    level_by_factor = dict(levels)
+    return [
+        level_name(factor, level_by_factor[factor]) if factor in level_by_factor else ""
+        for factor in factors
+    ]
 
 
 def _numbers(row: Difference) -> list[str]:

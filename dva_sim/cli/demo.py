@@ -88,8 +88,8 @@ def _film_under_way(path: Path) -> Iterator[None]:
 def _command(path: Path) -> list[str]:
     """Return the command that makes the film, which users may give as well."""
     drive = ["episode", SCENARIO, "--seed", str(SEED), "--set", DELAY]
-    shown = ["--side-by-side", PATTERNS, "--inset", "--video", str(path)]
-    return [sys.executable, "-m", "dva_sim", *drive, *shown]
+    pictures = ["--side-by-side", PATTERNS, "--inset", "--video", str(path)]
+    return [sys.executable, "-m", "dva_sim", *drive, *pictures]
 
 
 def _say_when_done(maker: subprocess.Popen[bytes], part: Path, path: Path) -> None:

@@ -28,10 +28,12 @@ def make_keys(folder: Path, names: Iterable[str]) -> str:
     Raises:
         ConfigError: a name that stands for nothing, or a folder that cannot be written.
     """
-    wanted = dict.fromkeys(id_tag for name in names for id_tag in _ids(name))
-    made = create_keys(folder, wanted)
-    kept = len(wanted) - len(made)
-    return f"{folder}: made {len(made)} pairs of keys" + (f", {kept} were there" if kept else "")
+    id_tags = dict.fromkeys(id_tag for name in names for id_tag in _ids(name))
+    made = create_keys(folder, id_tags)
+    already = len(id_tags) - len(made)
+    return f"{folder}: made {len(made)} pairs of keys" + (
+        f", {already} were there" if already else ""
+    )
 
 
 def _ids(name: str) -> Iterator[str]:

@@ -74,10 +74,12 @@ def is_local(host: str) -> bool:
     except ValueError:
         pass
     try:
-        found = [str(entry[4][0]) for entry in socket.getaddrinfo(host, None)]
+        addresses = [str(entry[4][0]) for entry in socket.getaddrinfo(host, None)]
     except OSError:
         return False  # the command itself reports an address that does not exist
-    return bool(found) and all(ipaddress.ip_address(a.partition("%")[0]).is_loopback for a in found)
+    return bool(addresses) and all(
+        ipaddress.ip_address(a.partition("%")[0]).is_loopback for a in addresses
+    )
 
 
 def _beyond(hosts: Iterable[str]) -> list[str]:

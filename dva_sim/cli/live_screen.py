@@ -73,9 +73,9 @@ class Board:
             self._events[report.number] = report.events
             every = {event["number"]: event for of in self._events.values() for event in of}
             self.events = [every[number] for number in sorted(every)]
-            known = set().union(*self._registered.values())
+            before = set().union(*self._registered.values())
             self._registered[report.number] = {row["label"] for row in report.rows}
-            for label in known - set().union(*self._registered.values()):
+            for label in before - set().union(*self._registered.values()):
                 del self.devices[label]
         self.story = sorted(self.story + report.story)[-1000:]
         return sorted(report.story)
@@ -225,10 +225,10 @@ def run_one(part: str, options: LiveOptions) -> None:
             from dva_sim.console.remote.beside import PageBeside  # late: start-up
 
             beside = PageBeside(options, partial(_print, screen.console))
-        found = run_part(part, options, say, options.number, beside=beside)
+        verdicts = run_part(part, options, say, options.number, beside=beside)
     console.print(board.table())
-    _print_rules(console, found)
-    refuse_unheld(found)
+    _print_rules(console, verdicts)
+    refuse_unheld(verdicts)
 
 
 def _default_dvas(options: LiveOptions) -> str:
@@ -284,6 +284,6 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
     refuse_unheld(summary.verdicts)
 
 
-def _print_rules(console: Console, found: Sequence[Verdict]) -> None:
-    for verdict in found:
+def _print_rules(console: Console, verdicts: Sequence[Verdict]) -> None:
+    for verdict in verdicts:
         _print(console, str(verdict))

@@ -41,17 +41,17 @@ def load(options: LoadOptions, quiet: Quiet = False, as_json: Json = False) -> N
         if out.suffix != ".csv":
             raise ConfigError(f"{out} should end in .csv")
         refuse_to_replace([out], options.overwrite)
-    found = []
+    steps = []
     for figures in run_load(options):
-        found.append(figures)
+        steps.append(figures)
         if not (quiet or as_json):
             for line in lines(figures):
                 typer.echo(line)
         if out is not None:
-            write_whole(out, table(found))
+            write_whole(out, table(steps))
     if as_json:
-        print_json([asdict(figures) for figures in found])
-    if found[-1].broke and not options.until_it_breaks:
+        print_json([asdict(figures) for figures in steps])
+    if steps[-1].broke and not options.until_it_breaks:
         raise typer.Exit(ExitCode.DOES_NOT_HOLD)
 
 
@@ -83,11 +83,11 @@ def _cell(value: object) -> object:
     return "" if math.isnan(value) else round(value, DECIMALS)
 
 
-def table(found: list[LoadFigures]) -> str:
+def table(steps: list[LoadFigures]) -> str:
     """Return the figures as CSV, a row for each step; empty cells for what is not known."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow([field.name for field in fields(found[0])])
-    for figures in found:
+    rows.writerow([field.name for field in fields(steps[0])])
+    for figures in steps:
         rows.writerow(map(_cell, vars(figures).values()))
     return text.getvalue()

@@ -149,7 +149,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
 
 def as_json(kind: str | None = None) -> dict[str, Any]:
     """Return the list as JSON: for each kind a list of `name`, `description` and `file`."""
-    return {name: [vars(entry) for entry in found] for name, found in everything(kind).items()}
+    return {name: [vars(entry) for entry in entries] for name, entries in everything(kind).items()}
 
 
 def lines(kind: str | None = None) -> Iterator[str]:
@@ -178,10 +178,10 @@ def _described(path: Path) -> str:
     """Return a file's description, without parsing all of it as YAML."""
     try:
         head = _HEAD.search(path.read_text(encoding="utf-8") + "\n")
-        found = parse_scalar(head[0]) if head else {}
+        fields = parse_scalar(head[0]) if head else {}
     except (OSError, ValueError, ConfigError):
         return ""
-    return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
+    return _first(" ".join(str(next(iter(fields.values()), "")).split())) if fields else ""
 
 
 @cache

@@ -35,20 +35,20 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     classes: dict[str, Any] = {name: of for name, of in hints.items() if is_dataclass(of)}
-    asked: list[Parameter] = []
+    parameters: list[Parameter] = []
     for name, parameter in inspect.signature(command).parameters.items():
         if name in classes:
-            asked += _options_of(classes[name])
+            parameters += _options_of(classes[name])
             continue
         of, form = split(hints[name])
-        asked.append(
+        parameters.append(
             parameter.replace(annotation=hints[name], kind=Parameter.KEYWORD_ONLY)
             if form is None  # as Typer itself describes it
             else _option(name, of, form, parameter.default)
         )
 
-    def call(**given: Any) -> None:
-        values = {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()}
+    def call(**words: Any) -> None:
+        values = {name: tuple(v) if isinstance(v, list) else v for name, v in words.items()}
         made = {
             name: of(**{each: values.pop(each) for each in forms_of(of) if each in values})
             for name, of in classes.items()
@@ -56,7 +56,7 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
         command(**made, **values)
 
     call.__doc__ = command.__doc__
-    vars(call)["__signature__"] = inspect.Signature(asked)
+    vars(call)["__signature__"] = inspect.Signature(parameters)
     return call
 
 

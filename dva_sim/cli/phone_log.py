@@ -20,11 +20,11 @@ def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
         ConfigError: it is no such file, or too short.
     """
     motion, guesses = _motion(path, unit)
-    found = figures_of(motion, path)
+    figures = figures_of(motion, path)
     if as_json:
-        print_json(found._asdict() | {"guesses": guesses})
+        print_json(figures._asdict() | {"guesses": guesses})
         return
-    for line in (*lines(found), *map(_guessed, guesses)):
+    for line in (*lines(figures), *map(_guessed, guesses)):
         print(line)
 
 
@@ -41,17 +41,17 @@ def _guessed(guess: str) -> str:
     return f"guessed: {guess}"
 
 
-def lines(found: MotionFigures) -> list[str]:
+def lines(figures: MotionFigures) -> list[str]:
     """Return the figures in words."""
     texts = [
-        f"{found.samples} samples in {found.duration_s:.1f} s: {found.rate_hz:.1f} a second, "
-        f"jitter {100.0 * found.jitter:.1f} %",
-        f"gaps: {found.gaps}, the longest interval {1000.0 * found.longest_gap_s:.0f} ms",
-        f"noise at rest {found.noise_mg:.2f} mg, steps of {found.resolution_mg:.3f} mg, "
-        f"largest {found.largest_g:.2f} g",
+        f"{figures.samples} samples in {figures.duration_s:.1f} s: {figures.rate_hz:.1f} a second, "
+        f"jitter {100.0 * figures.jitter:.1f} %",
+        f"gaps: {figures.gaps}, the longest interval {1000.0 * figures.longest_gap_s:.0f} ms",
+        f"noise at rest {figures.noise_mg:.2f} mg, steps of {figures.resolution_mg:.3f} mg, "
+        f"largest {figures.largest_g:.2f} g",
     ]
-    if found.late_ms is not None:
-        texts.append(f"{found.late_ms:.0f} ms from a sample to when it came")
+    if figures.late_ms is not None:
+        texts.append(f"{figures.late_ms:.0f} ms from a sample to when it came")
     return texts
 
 

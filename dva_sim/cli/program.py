@@ -68,11 +68,11 @@ def _help(param: Any) -> str:
 def _options(error: Any, more: str) -> str:
     if error.ctx is None:
         return more
-    known = [opt for param in error.ctx.command.get_params(error.ctx) for opt in param.opts]
-    near = hint(error.option_name, [opt for opt in known if opt.startswith("--")])
+    names = [opt for param in error.ctx.command.get_params(error.ctx) for opt in param.opts]
+    near = hint(error.option_name, [opt for opt in names if opt.startswith("--")])
     if near.startswith("did you"):
         return near
-    keys = _keys(error.option_name.lstrip("-")) if "--set" in known else []
+    keys = _keys(error.option_name.lstrip("-")) if "--set" in names else []
     return f"did you mean {either(f'--set {key}=VALUE' for key in keys)}?" if keys else more
 
 
@@ -159,8 +159,8 @@ class DvaSimProgram(PanelGroup):
             formatter.write_dl([(str(int(code)), code.meaning) for code in ExitCode])
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_given: bool) -> None:
+    if is_given:
         typer.echo(f"dva-sim {__version__}")
         raise typer.Exit(ExitCode.OK)
 

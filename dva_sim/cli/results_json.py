@@ -86,7 +86,7 @@ def compared(
     """
     matched = comparison.matched
     pairs, runs = comparison.paired
-    wanted: Sequence[str | None] = measures or [None]
+    names: Sequence[str | None] = measures or [None]
     return {
         "a": _side(comparison.sides[0]),
         "b": _side(comparison.sides[1]),
@@ -97,21 +97,21 @@ def compared(
         },
         "runs_a": runs,
         "pairs": pairs,
-        "measures": [_measure(comparison, measure, by) for measure in wanted],
+        "measures": [_measure(comparison, measure, by) for measure in names],
         "changed": comparison.changed()[0] if pairs else [],
         "gates": [_gate(text, verdicts) for text in dict.fromkeys(v.gate.text for v in verdicts)],
     }
 
 
 def _finding(reading: Reading) -> Data | None:
-    found = reading.finding
-    if found is None or reading.view is None:
+    finding = reading.finding
+    if finding is None or reading.view is None:
         return None
-    numbers = zip(found.levels, found.mean, found.low, found.high, strict=True)
+    numbers = zip(finding.levels, finding.mean, finding.low, finding.high, strict=True)
     keys = ("measure", "unit", "factor", "first", "second", "over")
-    return {key: getattr(found, key) for key in keys} | {
+    return {key: getattr(finding, key) for key in keys} | {
         "within": dict(reading.view.panels[0]),
-        "in_excess_of_reference": found.in_excess,
+        "in_excess_of_reference": finding.in_excess,
         "differences": [
             {"level": level, "mean": float(mean), "low": float(low), "high": float(high)}
             for level, mean, low, high in numbers
@@ -129,8 +129,10 @@ def _cells(reading: Reading) -> Iterator[Data]:
         grid = part.grid(view.measure)
         for setting in part.settings():
             count = int((part.where(made, setting) == part.where(made, setting)).sum())
-            found = interval_of(part.where(grid, setting))
-            mean, low, high = (found.mean, found.low, found.high) if found else (None,) * 3
+            interval = interval_of(part.where(grid, setting))
+            mean, low, high = (
+                (interval.mean, interval.low, interval.high) if interval else (None,) * 3
+            )
             numbers = {"runs": count, "measure": view.measure, "mean": mean, "low": low}
             yield _place(part.name, tuple(setting.items())) | numbers | {"high": high}
 

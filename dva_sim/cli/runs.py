@@ -67,18 +67,20 @@ def replay(
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
-        bag, kept = (None if to is None else Path(to) for to in (options.ros2, options.mcap))
-        stories.replay(Path(options.file), Wanted.of(options), bag, kept)
+        bag, recording_copy = (
+            None if to is None else Path(to) for to in (options.ros2, options.mcap)
+        )
+        stories.replay(Path(options.file), Wanted.of(options), bag, recording_copy)
 
 
-def _show_replay(page: PageOptions, **asked: Path) -> None:
+def _show_replay(page: PageOptions, **recordings: Path) -> None:
     """Play recordings on a page in the browser, until Ctrl-C."""
     from dva_sim.cli import exposure  # late: start-up
 
     exposure.warn_of_pages([page.host], has_token=not page.no_token, can=exposure.WATCHERS)
     from dva_sim.console.replay.console import show_replay  # late: start-up
 
-    show_replay(page, _say_at_once, **asked)
+    show_replay(page, _say_at_once, **recordings)
 
 
 def live(options: LiveOptions, quiet: Quiet = False, verbose: Verbose = False) -> None:

@@ -107,13 +107,15 @@ def tell_story(playback: Playback, console: Console) -> None:
     console.print(table)
 
 
-def tell_outcome(tables: Tables, how: str, console: Console, found: Sequence[Verdict] = ()) -> None:
+def tell_outcome(
+    tables: Tables, how: str, console: Console, verdicts: Sequence[Verdict] = ()
+) -> None:
     """Print the outcome of a run.
 
     Args:
         tables: The rows of the run, by table.
         how: Way in which it ran, printed after its length in seconds.
-        found: Verdicts on the safety rules, where facts may be missing to judge them.
+        verdicts: Verdicts on the safety rules, where facts may be missing to judge them.
     """
     row = tables["runs"][0]
     lines = [_event(event) for event in tables["events"]]
@@ -125,8 +127,8 @@ def tell_outcome(tables: Tables, how: str, console: Console, found: Sequence[Ver
     if tables["people"]:
         lines.append(f"people: {_fared(row, tables['people'])}")
     lines.append(f"{row['simulated_s']:.0f} s {how}, {row['messages']:,} messages")
-    if unjudged_rules(found):
-        lines.append(_unjudged(found))
+    if unjudged_rules(verdicts):
+        lines.append(_unjudged(verdicts))
     else:
         lines.append(f"safety rules: {_violations(row['violations'])}")
     lines += _failed(row)
@@ -149,8 +151,8 @@ def tell_full(run: Played, console: Console) -> None:
 
 
 def _event(row: Row) -> str:
-    known = row["response_s"] == row["response_s"]
-    response = f", on scene {row['response_s']:.1f} s after detection" if known else ""
+    is_reached = row["response_s"] == row["response_s"]
+    response = f", on scene {row['response_s']:.1f} s after detection" if is_reached else ""
     by = " by" if row["outcome"] in ("confirmed", "refuted") else ", looked at by"
     who = f"{by} {row['responder']}" if row["responder"] else ""
     return f"{row['kind']}: {row['outcome']}{who}{response}"
@@ -181,15 +183,15 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
     return ", ".join(parts)
 
 
-def _unjudged(found: Sequence[Verdict]) -> str:
+def _unjudged(verdicts: Sequence[Verdict]) -> str:
     """Say which safety rules could not be judged and why, and what is known of the others."""
     why: dict[str, list[str]] = {}
-    for verdict in found:
+    for verdict in verdicts:
         if verdict.lacks_facts:
             why.setdefault(verdict.text, []).append(verdict.rule)
     parts = [f"{', '.join(rules)} not judged: {text}" for text, rules in why.items()]
     for state in (BROKEN, HELD):
-        if rules := list(dict.fromkeys(v.rule for v in found if v.state == state)):
+        if rules := list(dict.fromkeys(v.rule for v in verdicts if v.state == state)):
             parts.append(f"{', '.join(rules)} {state}")
     return f"safety rules: {'; '.join(parts)}"
 
@@ -390,10 +392,10 @@ def episode(request: EpisodeRequest, where: Console = console) -> None:
     Raises:
         ConfigError: it cannot be played, drawn or kept.
     """
-    asked = request.scenarios()
-    warn(doubts(asked), where)
+    scenarios = request.scenarios()
+    warn(doubts(scenarios), where)
     runs = []
-    for scenario in asked:
+    for scenario in scenarios:
         runs.append(request.play(scenario))
         tell(runs[-1], where)
     if len(runs) > 1:
@@ -418,8 +420,8 @@ def replay(
     from dva_sim.live.recorded_lines import is_part, readable  # late: start-up
     from dva_sim.testing.evidence import judged_recording  # late: start-up
 
-    with readable(file, mcap) as found:
-        opened = open_recording(found, pictures)
+    with readable(file, mcap) as recording:
+        opened = open_recording(recording, pictures)
         run = opened.playback
         verdicts = judged_recording(opened)
         tell_story(run, where)

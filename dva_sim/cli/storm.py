@@ -87,12 +87,12 @@ def storm(
     drawn(first, profile)  # an unknown profile is refused before anything starts
     out.mkdir(parents=True, exist_ok=True)
     tally = StormTally()
-    known = 0
+    played_before = 0
     failed: list[StormOutcome] = []
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
     for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
         tally.add(outcome)
-        known += is_known
+        played_before += is_known
         if not outcome.is_clean:
             _tell_failure(outcome, profile)
             failed.append(outcome)
@@ -101,7 +101,7 @@ def storm(
             typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
         if hours and tally.hours >= hours:
             break
-    _tell(tally, known)
+    _tell(tally, played_before)
     for outcome in failed:  # last: reducing one takes minutes of a single process
         _keep_failure(drawn(outcome.seed, profile), outcome, out / "found", profile)
     raise typer.Exit(ExitCode.DOES_NOT_HOLD if tally.failures else ExitCode.OK)
@@ -118,9 +118,9 @@ def _replay(plan: StormPlan) -> ExitCode:
     """Play one storm, and tell its story."""
     from dva_sim.storms.storm import play  # late: start-up
 
-    kept = list[Any]()
-    outcome = play(plan, kept.append)
-    for moment in kept[0].recorder.timeline:
+    runs = list[Any]()
+    outcome = play(plan, runs.append)
+    for moment in runs[0].recorder.timeline:
         typer.echo(f"{moment.time:9.3f} s  {moment.who}: {moment.what}")
     _tell_failure(outcome, "")
     typer.echo(f"{outcome.simulated_s:.0f} s, digest {outcome.digest}")
@@ -153,12 +153,12 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
     shrinker = Shrinker(plan, outcome)
     small = shrinker.shrink()
     folder.mkdir(parents=True, exist_ok=True)
-    kept = list[Any]()
-    again = play(small, kept.append)
+    runs = list[Any]()
+    again = play(small, runs.append)
     when = min((breach.time for breach in again.breaches), default=again.simulated_s)
     story = [
         f"{moment.time:9.3f} s  {moment.who}: {moment.what}\n"
-        for moment in kept[0].recorder.timeline
+        for moment in runs[0].recorder.timeline
         if abs(moment.time - when) < AROUND or moment.kind == "fault"
     ]
     file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
@@ -166,11 +166,11 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
     typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
 
 
-def _tell(tally: StormTally, known: int) -> None:
+def _tell(tally: StormTally, played_before: int) -> None:
     faults = sum(tally.faults.values())
     touched = sum(tally.messages.values())
     typer.echo(
-        f"{tally.storms} storms ({known} played before), {tally.hours:.1f} fleet-hours, "
+        f"{tally.storms} storms ({played_before} played before), {tally.hours:.1f} fleet-hours, "
         f"{faults} faults, {touched} messages touched; {tally.cpu_s:.0f} s of CPU time"
     )
     for kind, times in sorted(tally.faults.items()):

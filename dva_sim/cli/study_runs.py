@@ -63,16 +63,16 @@ def tune(options: TuneOptions) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.trials import tune as try_all  # late: start-up
 
-    asked = open_study(options.study)
+    study = open_study(options.study)
     jobs = options.jobs
-    trials = tuning_study(asked)
+    trials = tuning_study(study)
     folder = Path(options.out or folder_of_tuning(str(options.study)))
     say(f"[bold]{escape(trials.question)}[/bold]")
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))
     try:
         with _bar("trying", before.runs) as show:
-            tuned = try_all(asked, folder, jobs=jobs, progress=show)
+            tuned = try_all(study, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     for seen in tuned.seen:
@@ -81,7 +81,7 @@ def tune(options: TuneOptions) -> ExitCode:
     for choice in tuned.chosen:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
-    say(f"Kept in {save_tuned(asked, tuned)}")
+    say(f"Kept in {save_tuned(study, tuned)}")
     return ExitCode.OK
 
 
@@ -91,11 +91,11 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
     from dva_sim.experiments.report.figures.screening import draw_screening  # late: start-up
     from dva_sim.experiments.trials import screen as run_all  # late: start-up
 
-    asked = open_study(study)
-    trials = screening_study(asked)
+    loaded = open_study(study)
+    trials = screening_study(loaded)
     folder = Path(out or folder_of_screening(study))
     say(f"[bold]{escape(trials.question)}[/bold]")
-    say(f"{len(screened(asked))} assumed numbers, each within its band")
+    say(f"{len(screened(loaded))} assumed numbers, each within its band")
     before = dry_run(trials, folder, jobs=jobs, probe=run_job if only_plan else None)
     say(_plan(before, folder))
     if only_plan:
@@ -103,21 +103,24 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
         return ExitCode.OK
     try:
         with _bar("screening", before.runs) as show:
-            found = run_all(asked, folder, jobs=jobs, progress=show)
+            screening = run_all(loaded, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
-    for line in draw_screening(asked, found, folder):
+    for line in draw_screening(loaded, screening, folder):
         say(escape(line))
-    tell_files(folder, found.write(folder / TABLE).name)
-    say(f"Kept in {found.write(file_of_screening(asked))}, which the reports of other studies cite")
+    tell_files(folder, screening.write(folder / TABLE).name)
+    say(
+        f"Kept in {screening.write(file_of_screening(loaded))}, which the reports of other studies "
+        "cite"
+    )
     return ExitCode.OK
 
 
 def plan(options: RunOptions) -> None:
     """Say what `run` would do."""
-    shown = _Shown(options, run_job)
-    planned_study(options, shown)
-    say(escape(_time(shown.preview)))
+    progress = _Shown(options, run_job)
+    planned_study(options, progress)
+    say(escape(_time(progress.preview)))
 
 
 class _Shown(StudyListener):
@@ -194,26 +197,28 @@ class _Shown(StudyListener):
                 yield show
 
 
-def _plan(found: DryRun, folder: Path) -> str:
-    done = f", {found.done} of them done already" if found.done else ""
-    most = f"at most {found.runs}" if found.rounds > 1 else f"{found.runs}"
-    rounds = f" and up to {found.rounds} rounds" if found.rounds > 1 else ""
-    return f"{most} runs in {found.cells} configurations{rounds}{done}; into {folder}"
+def _plan(preview: DryRun, folder: Path) -> str:
+    done = f", {preview.done} of them done already" if preview.done else ""
+    most = f"at most {preview.runs}" if preview.rounds > 1 else f"{preview.runs}"
+    rounds = f" and up to {preview.rounds} rounds" if preview.rounds > 1 else ""
+    return f"{most} runs in {preview.cells} configurations{rounds}{done}; into {folder}"
 
 
-def _time(found: DryRun) -> str:
+def _time(preview: DryRun) -> str:
     """Describe how long it will take, and how that was estimated."""
-    if found.runs == found.done:
+    if preview.runs == preview.done:
         return "nothing is left to run"
-    failed = f"a run that was tried failed: {found.failed}" if found.failed else ""
-    if found.estimate_s is None:
+    failed = f"a run that was tried failed: {preview.failed}" if preview.failed else ""
+    if preview.estimate_s is None:
         return f"no estimate of the time: {failed or 'no run is done yet, and none was tried'}"
-    runs = f"{_counted(found.tried, 'run')} tried now" if found.tried else "the runs done already"
-    about = "more than" if found.is_least else "about"
-    who = _counted(found.workers, "process", "processes")
-    cpu = f" ({duration(found.cpu_s)} of CPU time)" if found.cpu_s else ""
-    text = f"{about} {duration(found.estimate_s)} to go with {who}{cpu}, judged by {runs}"
-    text += "; the last was stopped before its end" if found.is_least else ""
+    runs = (
+        f"{_counted(preview.tried, 'run')} tried now" if preview.tried else "the runs done already"
+    )
+    about = "more than" if preview.is_least else "about"
+    who = _counted(preview.workers, "process", "processes")
+    cpu = f" ({duration(preview.cpu_s)} of CPU time)" if preview.cpu_s else ""
+    text = f"{about} {duration(preview.estimate_s)} to go with {who}{cpu}, judged by {runs}"
+    text += "; the last was stopped before its end" if preview.is_least else ""
     return f"{text}; {failed}" if failed else text
 
 

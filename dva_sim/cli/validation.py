@@ -100,16 +100,16 @@ def _refuse_foreign(options: ValidateOptions) -> None:
 def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:
     """Play, show the evidence, its state first, and write it if asked to; how it ended."""
     started = time.perf_counter()
-    found = play()
-    say(f"[bold]{escape(found.headline)}[/bold]")
-    for note in found.notes:
+    result = play()
+    say(f"[bold]{escape(result.headline)}[/bold]")
+    for note in result.notes:
         say(escape(note))
-    for sheet in found.printed:
+    for sheet in result.printed:
         _tell(sheet)
     say(f"\n{time.perf_counter() - started:.0f} s")
     if out is not None:
-        say(f"Report: {found.write(out)}")
-    return ExitCode.OK if found.passes else ExitCode.GATE_FAILED
+        say(f"Report: {result.write(out)}")
+    return ExitCode.OK if result.passes else ExitCode.GATE_FAILED
 
 
 def _tell(sheet: ResultSheet) -> None:
@@ -182,12 +182,14 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
     with _bar() as bar:
         exact = len(EXACT)
         task = bar.add_task("exact", total=exact + operators.jobs_of(EXPERIMENTS, setting))
-        found = operators.play_exact(list(EXACT), setting, lambda n: bar.update(task, completed=n))
+        simulated = operators.play_exact(
+            list(EXACT), setting, lambda n: bar.update(task, completed=n)
+        )
         bar.update(task, description="persons")
         played = operators.play_experiments(
             EXPERIMENTS, setting, lambda n: bar.update(task, completed=exact + n)
         )
-    found |= operators.measured(EXPERIMENTS, played, seed)
+    simulated |= operators.measured(EXPERIMENTS, played, seed)
     conditions = {
         "operators": setting.strategy,
         "persons": str(persons),
@@ -195,7 +197,7 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
         "length": _length(quick),
     }
     return operators_evidence.evidence(
-        lines, found, split.rule, played=played, conditions=conditions
+        lines, simulated, split.rule, played=played, conditions=conditions
     )
 
 
@@ -243,14 +245,16 @@ def _compared(
 ) -> ValidationResult:
     with _bar() as bar:
         task = bar.add_task("runs of the model", total=comparison.runs_in(groups, setting))
-        found = comparison.compare(groups, setting, lambda n: bar.update(task, completed=n))
-    depths = ", ".join(f"{depth} {count}" for depth, count in comparison.depths_of(found).items())
+        comparisons = comparison.compare(groups, setting, lambda n: bar.update(task, completed=n))
+    depths = ", ".join(
+        f"{depth} {count}" for depth, count in comparison.depths_of(comparisons).items()
+    )
     conditions = conditions | {
         "depth of the model, conditions": depths,
         "seed": str(setting.seed),
         "length": _length(setting.quick),
     }
-    return network_evidence.evidence(found, conditions, causes)
+    return network_evidence.evidence(comparisons, conditions, causes)
 
 
 def _beside(source: str, quick: bool, workers: int) -> ValidationResult:
@@ -269,14 +273,14 @@ def _beside(source: str, quick: bool, workers: int) -> ValidationResult:
     plays = predictions.QUICK_PLAYS if quick else predictions.PLAYS
     with _bar() as bar:
         task = bar.add_task("runs of the model")
-        found = beside.beside_of(
+        result = beside.beside_of(
             configurations,
             measured,
             plays,
             workers,
             lambda done, of: bar.update(task, completed=done, total=of),
         )
-    return replace(found, conditions={"study": source, "plays of each seed": str(plays)})
+    return replace(result, conditions={"study": source, "plays of each seed": str(plays)})
 
 
 def _measured_now(

@@ -78,10 +78,10 @@ def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str
     from dva_sim.kernel.measure import Measure  # late: start-up
 
     width = max(map(len, row), default=0)
-    known = {column.name: column for column in columns}
-    for name, found in row.items():
-        column = known.get(name) or Measure(name, "")
-        value = f"{plain(found)} {column.unit}".strip()
+    column_by_name = {column.name: column for column in columns}
+    for name, cell in row.items():
+        column = column_by_name.get(name) or Measure(name, "")
+        value = f"{plain(cell)} {column.unit}".strip()
         yield f"{name:<{width}}  {value:<14}  {column.meaning}".rstrip()
 
 

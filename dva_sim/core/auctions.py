@@ -39,9 +39,9 @@ class Auctions:
     bid_within: float
     running: dict[int, RunningAuction] = field(default_factory=dict)
 
-    def announce(self, event: int, asked: Sequence[str], now: float) -> float:
+    def announce(self, event: int, bidders: Sequence[str], now: float) -> float:
         """Begin an auction; how long bids are taken [s]."""
-        self.running[event] = RunningAuction(now + self.bid_within, set(asked))
+        self.running[event] = RunningAuction(now + self.bid_within, set(bidders))
         return self.bid_within
 
     def bid(self, event: int, device: str, arrival_in: float, now: float) -> bool:

@@ -81,18 +81,18 @@ def _everybody(dispatcher: Dispatcher, event: Event, now: float) -> Iterator[m.C
 def _ways(dispatcher: Dispatcher, entries: list[DeviceEntry], event: Event) -> list[float]:
     """Return when each device would arrive [s from now]; infinite where unknown, or never."""
     engaged = dispatcher.orders.engaged
-    known = {
+    positions = {
         e.device.id_tag: Start(
             e.device.id_tag, KINDS[e.device.device_type], e.position, e.device.id_tag in engaged
         )
         for e in entries
         if e.position is not None
     }
-    if not known:
+    if not positions:
         return [math.inf] * len(entries)
-    eta = dispatcher.situations.travel(list(known.values()), [event.position])[1][0]
-    found = dict(zip(known, map(float, eta), strict=True))
-    return [found.get(entry.device.id_tag, math.inf) for entry in entries]
+    eta = dispatcher.situations.travel(list(positions.values()), [event.position])[1][0]
+    etas = dict(zip(positions, map(float, eta), strict=True))
+    return [etas.get(entry.device.id_tag, math.inf) for entry in entries]
 
 
 def _why_not(

@@ -183,14 +183,15 @@ class ControlRooms:
     def _acknowledge(
         self, body: m.Acknowledge, event: Event, sender: m.Device, now: float
     ) -> list[Send] | str:
-        known = event.handling.acknowledged
-        if known is None:
+        acknowledgement = event.handling.acknowledged
+        if acknowledgement is None:
             event.handling.acknowledged = Choice(sender.id_tag, sender.label, "acknowledge", now)
             return []
-        if known.author == sender.id_tag:
+        if acknowledgement.author == sender.id_tag:
             return "acknowledged already"
         raise _Refused(
-            m.OUT_OF_ORDER, f"acknowledged by {known.label}, {now - known.time:.1f} s ago"
+            m.OUT_OF_ORDER,
+            f"acknowledged by {acknowledgement.label}, {now - acknowledgement.time:.1f} s ago",
         )
 
     def _add_note(
@@ -287,8 +288,8 @@ class ControlRooms:
         if device.device_type == ROBOT:
             raise _Refused(m.NOT_SUPPORTED, "a robot can only look")
         if (task == "contain") != (event.state is State.CONFIRMED):
-            asked = "stand_by until it is" if task == "contain" else "contain, as it is confirmed"
-            raise _Refused(m.WRONG_MODE, f"event {event.number} is {event.state}: {asked}")
+            allowed = "stand_by until it is" if task == "contain" else "contain, as it is confirmed"
+            raise _Refused(m.WRONG_MODE, f"event {event.number} is {event.state}: {allowed}")
         if event.state is State.PENDING:
             raise _Refused(m.WRONG_MODE, "nobody looks there yet: send somebody to first")
         if event.actor is not None and body.decisions is None:

@@ -101,10 +101,10 @@ class Dispatcher:
         self.auctions.close(self.orders.events, now)
         for _ in range(DECISIONS):
             before = self.orders.counters["preempted"]
-            given = self._decide(now)
-            sends += given
+            orders = self._decide(now)
+            sends += orders
             # A recalled responder leaves its task open; an order to look leaves one to stand by.
-            looks = self.orders.rules.containment and any(map(_is_to_look, given))
+            looks = self.orders.rules.containment and any(map(_is_to_look, orders))
             if self.orders.counters["preempted"] == before and not looks:
                 break
         sends += self.orders.give_up(now)
@@ -167,7 +167,7 @@ class Dispatcher:
     def _carry_out(self, advice: Sequence[Advice], view: PolicyView, now: float) -> list[Send]:
         """Carry out the choice: nobody is sent to two places, and nothing is given to two."""
         taken: set[int] = set()
-        given: set[int] = set()
+        tasks: set[int] = set()
         sends: list[Send] = []
         for piece in advice:
             done: list[Send] | None = None
@@ -177,9 +177,9 @@ class Dispatcher:
                 pass
             elif isinstance(piece, Relocation):
                 done = self._relocate(piece, view, now)
-            elif piece.task not in given:
+            elif piece.task not in tasks:
                 done = self._assign(piece, view, now)
-                given.update({piece.task} if done is not None else ())
+                tasks.update({piece.task} if done is not None else ())
             if done is None:
                 self.orders.counters["overruled"] += 1
             else:
@@ -245,8 +245,8 @@ class Dispatcher:
         way = float(view.situation.eta[choice.task, choice.responder])
         event.handling.advised = device
         event.handling.expected[device] = (now, way)
-        asked = self.questions.asks and self.somebody_decides()
-        why = f"nobody has decided within {self.questions.within:g} s" if asked else ""
+        is_question = self.questions.asks and self.somebody_decides()
+        why = f"nobody has decided within {self.questions.within:g} s" if is_question else ""
         fact = Fact(
             time=now,
             author=orders.sessions.permissions.own,
@@ -272,13 +272,13 @@ class Dispatcher:
         idle = view.team.idle().difference(self.orders.engaged)
         able = np.isfinite(view.situation.eta[offer.task])
         both = zip(view.situation.responders, able, strict=True)
-        asked = [who.device for who, can in both if can and who.device in idle]
-        if not asked:
+        bidders = [who.device for who, can in both if can and who.device in idle]
+        if not bidders:
             return None
         self.orders.counters["auctions"] += 1
-        within = self.auctions.announce(event.number, asked, now)
+        within = self.auctions.announce(event.number, bidders, now)
         body = m.TaskAnnouncement(event.number, event.kind, event.position, event.severity, within)
-        return [Send(device, body) for device in asked]
+        return [Send(device, body) for device in bidders]
 
     def _relocate(self, move: Relocation, view: PolicyView, now: float) -> list[Send] | None:
         """Let an idle guard wait elsewhere, unless it is there already, or on its way there."""

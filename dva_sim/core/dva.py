@@ -293,27 +293,27 @@ class Dva:
     # --- who is there ------------------------------------------------------------------
 
     def _register(self, message: m.Message, body: m.Registration, now: float) -> DvaAnswer:
-        known = self.registry.entries.get(message.source)
+        registered = self.registry.entries.get(message.source)
         sends: list[Send] = []
-        if known is not None and known.device.device_type != body.device_type:
-            text = f"{message.source} is registered as {known.device.device_type}"
+        if registered is not None and registered.device.device_type != body.device_type:
+            text = f"{message.source} is registered as {registered.device.device_type}"
             return DvaAnswer(m.NOT_PERMITTED, text)
-        if known is not None and self.registry.is_elsewhere(message.source, body.address, now):
+        if registered is not None and self.registry.is_elsewhere(message.source, body.address, now):
             self.counters["registration of an id in use"] += 1
             text = (
-                f"{known.device.label} is heard at {known.device.address} under this id; use "
-                "another id, or wait until that device has been silent for "
+                f"{registered.device.label} is heard at {registered.device.address} under this id; "
+                "use another id, or wait until that device has been silent for "
                 f"{self.registry.silent_after:g} s"
             )
             return DvaAnswer(m.BUSY, text)
-        if known is not None and known.is_new_life(message.message_id, message.timestamp):
+        if registered is not None and registered.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
             if self.emergencies.holds(message.source):
                 sends.append(Send(message.source, m.Emergency()))  # nor that it is stopped
             self.sessions.forget(message.source)  # nor which orders of a session it has obeyed
-        if known is not None and known.device.address != body.address:
+        if registered is not None and registered.device.address != body.address:
             self.sessions.forget(message.source)  # its holder has to ask for the new address
-        if known is None and self.registry.is_full:
+        if registered is None and self.registry.is_full:
             sends = self._make_room(now)
         entry = self.registry.register(message.source, body, now)
         if entry is None:
@@ -353,9 +353,9 @@ class Dva:
         return sends
 
     def _with_nothing_open(self, devices: Iterable[str]) -> Iterator[str]:
-        kept = self.with_something_open()
+        unfinished = self.with_something_open()
         engaged = self.orders.engaged
-        return (d for d in devices if d not in kept and d not in engaged)
+        return (d for d in devices if d not in unfinished and d not in engaged)
 
     def with_something_open(self) -> set[str]:
         """Return the robots that the DVA must not forget: held, to be told, or stopped."""

@@ -65,9 +65,9 @@ class Handovers:
 
     def holder(self, robot: str, asker: str, now: float) -> m.Holder | None:
         """Return who else holds a robot, serves an order with it, or waits for it."""
-        known = self.under_way.get(robot)
-        if known is not None and robot in self.sessions.reserved and known.asker != asker:
-            return self._named(known.asker, 0.0)
+        handover = self.under_way.get(robot)
+        if handover is not None and robot in self.sessions.reserved and handover.asker != asker:
+            return self._named(handover.asker, 0.0)
         grant = self.sessions.permissions.grants.get(robot)
         if grant is not None and grant.holder not in (asker, self.sessions.permissions.own):
             return self._named(grant.holder, now - self._noted(robot, grant.session, now))
@@ -105,21 +105,21 @@ class Handovers:
     ) -> tuple[str, list[Send]]:
         """Return how a wish for another's robot stands, in words, and what to send."""
         robot = request.device
-        known = self.under_way.get(robot)
+        handover = self.under_way.get(robot)
         if request.takeover == "force":
             return Step.STOPPING, self._stop(robot, asker.id_tag, now)
         if request.takeover != "ask":
             return "", []
-        if known is not None:
-            return known.step if known.asker == asker.id_tag else "another waits for it", []
+        if handover is not None:
+            return handover.step if handover.asker == asker.id_tag else "another waits for it", []
         self.under_way[robot] = Handover(asker.id_tag, Step.ASKED, now + ANSWER_WITHIN)
         ask = m.HandoverRequest(robot, asker.id_tag, asker.label)
         return Step.ASKED, [Send(holder.holder, ask)]
 
     def waits(self, robot: str, asker: str) -> str | None:
         """Return why the asker has to wait for a robot that is reserved for it, or None."""
-        known = self.under_way.get(robot)
-        if known is None or known.asker != asker or known.step is not Step.STOPPING:
+        handover = self.under_way.get(robot)
+        if handover is None or handover.asker != asker or handover.step is not Step.STOPPING:
             return None
         return Step.STOPPING
 
@@ -127,14 +127,14 @@ class Handovers:
         """Take the word of a holder that gives its robot up, or does not."""
         body = send.body
         assert isinstance(body, m.HandoverRequest)
-        known = self.under_way.get(body.device)
-        if known is None or known.step is not Step.ASKED or known.asker != body.holder:
+        handover = self.under_way.get(body.device)
+        if handover is None or handover.step is not Step.ASKED or handover.asker != body.holder:
             return []
-        holder = self.holder(body.device, known.asker, now)
+        holder = self.holder(body.device, handover.asker, now)
         if gives and holder is not None and holder.holder == send.to:
-            return self._stop(body.device, known.asker, now)
-        known.step = Step.DECLINED
-        known.until = now + DECLINED_FOR
+            return self._stop(body.device, handover.asker, now)
+        handover.step = Step.DECLINED
+        handover.until = now + DECLINED_FOR
         return []
 
     def _stop(self, robot: str, asker: str, now: float) -> list[Send]:
@@ -149,28 +149,28 @@ class Handovers:
 
     def seen(self, robot: str, status: m.RobotStatus, now: float) -> None:
         """Hear from a robot how it is: it may stand by now, and know that its session is over."""
-        known = self.under_way.get(robot)
+        handover = self.under_way.get(robot)
         if (
-            known is None
-            or known.step is not Step.STOPPING
+            handover is None
+            or handover.step is not Step.STOPPING
             or self.sessions.has_unacknowledged(robot)
         ):
             return
         still = max(abs(status.speed), abs(status.turn_rate)) <= STANDING
         if still and status.mode == "Idle":
-            known.step = Step.READY
-            known.until = now + FETCH_WITHIN
+            handover.step = Step.READY
+            handover.until = now + FETCH_WITHIN
 
     def next_deadline(self) -> float:
         """Return when the next handover has taken too long [s]."""
-        return min((known.until for known in self.under_way.values()), default=math.inf)
+        return min((handover.until for handover in self.under_way.values()), default=math.inf)
 
     def lapse(self, now: float) -> None:
         """End what lasts too long, and what nobody is there for."""
         entries = self.orders.registry.entries
-        for robot, known in list(self.under_way.items()):
-            asker = entries.get(known.asker)
-            if known.until <= now or asker is None or asker.silent:
+        for robot, handover in list(self.under_way.items()):
+            asker = entries.get(handover.asker)
+            if handover.until <= now or asker is None or asker.silent:
                 self._over(robot)
 
     def _over(self, robot: str) -> None:

@@ -64,21 +64,21 @@ class Access:
         """Return True if a device may have a level of permission on a robot."""
         if level != "sensors" and holder.device_type not in DRIVERS:
             return False
-        wanted = _INCLUDES.get(level, {level})
+        levels = _INCLUDES.get(level, {level})
         rules = (r for r in self.rules if r.is_about(holder, robot, now))
-        return any(wanted <= r.includes for r in rules)
+        return any(levels <= r.includes for r in rules)
 
     def sensors(
-        self, holder: Device, robot: Device, wanted: Sequence[str], now: float
+        self, holder: Device, robot: Device, names: Sequence[str], now: float
     ) -> tuple[str, ...]:
         """Return those of the wanted sensors that a device may read."""
         rules = [r for r in self.rules if r.is_about(holder, robot, now)]
-        return tuple(s for s in wanted if any(r.sensors is None or s in r.sensors for r in rules))
+        return tuple(s for s in names if any(r.sensors is None or s in r.sensors for r in rules))
 
     def ends(self, holder: Device, robot: Device, level: str, now: float) -> float:
         """Return up to when a device may have a level of permission on a robot [s]."""
-        wanted = _INCLUDES.get(level, {level})
-        rules = (r for r in self.rules if r.is_about(holder, robot, now) and wanted <= r.includes)
+        levels = _INCLUDES.get(level, {level})
+        rules = (r for r in self.rules if r.is_about(holder, robot, now) and levels <= r.includes)
         return max((r.until for r in rules), default=now)
 
     def next_end(self, now: float) -> float:

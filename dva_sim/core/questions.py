@@ -47,8 +47,8 @@ class Questions:
     def ask(self, event: Event, task: str, device: str, eta: float, now: float) -> bool:
         """Put a question, or put it again; False: nobody has answered in time."""
         key = event.number, "confirm" if task == "confirm" else "contain"
-        known = self._open.get(key)
-        until = now + self.within if known is None else known.until
+        question = self._open.get(key)
+        until = now + self.within if question is None else question.until
         if now >= until:
             return False
         self._now[key] = Question(event, device, task, now + eta, until)

@@ -226,8 +226,8 @@ class Registry:
     def forget(self, id_tag: str) -> None:
         """Forget a device as if it had never registered."""
         entry = self.entries.pop(id_tag)
-        for known in (self._of_type, self._located):
-            known[entry.kind].pop(id_tag, None)
+        for entries in (self._of_type, self._located):
+            entries[entry.kind].pop(id_tag, None)
         self._heard.pop(id_tag, None)
         self._silent.pop(id_tag, None)
         self._overlook(id_tag)

@@ -215,8 +215,8 @@ class Reports:
 def _within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event | None:
     """Return the nearest event that can be felt at a place."""
     near = [(apart(e.position, place), e.number, e) for e in events if e.kind == kind]
-    found = min((entry for entry in near if entry[0] < REACH), default=None)
-    return found[2] if found else None
+    nearest = min((entry for entry in near if entry[0] < REACH), default=None)
+    return nearest[2] if nearest else None
 
 
 def _is_no_news(events: EventTable, kind: str, place: m.Position, now: float) -> bool:

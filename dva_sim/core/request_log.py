@@ -82,8 +82,8 @@ class KeptRequests:
         self._wanted_until = now + KEPT_FOR
         listed = list[m.LoggedRequest]()
         room = LIST_BYTES
-        found = (request for request in self._kept if request.number > number)
-        for request in islice(found, MOST_LISTED):
+        newer = (request for request in self._kept if request.number > number)
+        for request in islice(newer, MOST_LISTED):
             entry = _entry(request, now)
             room -= ENTRY_BYTES + len(entry.request) + xml_size(entry.text or "")
             if listed and room < 0:
@@ -108,7 +108,7 @@ def _entry(request: KeptRequest, now: float) -> m.LoggedRequest:
 
 def without_sessions(data: bytes) -> bytes:
     """Return a message whose sessions end in zeros in place of their random half."""
-    return _SESSION.sub(lambda found: found[1] + _public_half(found[2]), data)
+    return _SESSION.sub(lambda match: match[1] + _public_half(match[2]), data)
 
 
 def _public_half(session: bytes) -> bytes:

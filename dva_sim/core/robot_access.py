@@ -126,9 +126,9 @@ class RobotAccess:
             robot = self._entries.get(grant.robot)
             if holder is None or robot is None:
                 continue
-            kept = self._access.sensors(holder.device, robot.device, grant.sensors, now)
+            sensors = self._access.sensors(holder.device, robot.device, grant.sensors, now)
             allowed = self._access.allows(holder.device, robot.device, grant.level, now)
-            if not allowed or kept != grant.sensors:
+            if not allowed or sensors != grant.sensors:
                 self._dispatcher.orders.counters["permission revoked"] += 1
                 self._sessions.revoke(grant)
         self.next_end = self._access.next_end(now)

@@ -101,9 +101,9 @@ class Sessions:
             holder: Id of the device; None: the holder.
             to_read: True if a permission to read sensors is sufficient.
         """
-        known = self.permissions
-        reads = known.observers.get((robot, holder or "")) if to_read else None
-        drives = known.grants.get(robot)
+        permissions = self.permissions
+        reads = permissions.observers.get((robot, holder or "")) if to_read else None
+        drives = permissions.grants.get(robot)
         return reads or (drives if drives is not None and holder in (None, drives.holder) else None)
 
     def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
@@ -172,16 +172,16 @@ class Sessions:
         no longer, or no session can be so high; then it is as if it had not arrived.
         """
         body = send.body
-        known = self.permissions
-        grant = known.grants.get(send.to)
+        permissions = self.permissions
+        grant = permissions.grants.get(send.to)
         if not isinstance(body, m.PermissionGrant) or grant is None:
             return None
-        if grant.session != body.session or is_absurd(floor, known.count << LOW_BITS):
+        if grant.session != body.session or is_absurd(floor, permissions.count << LOW_BITS):
             return None
-        known.count = max(known.count, floor >> LOW_BITS)
-        grant = known.renew(grant)
+        permissions.count = max(permissions.count, floor >> LOW_BITS)
+        grant = permissions.renew(grant)
         over = m.PermissionRevocation(send.to, grant.holder, send.session)
-        if grant.holder != known.own:
+        if grant.holder != permissions.own:
             self._over.append(Send(grant.holder, over))
         again = m.PermissionGrant(
             grant.holder, grant.level, grant.session, grant.address, grant.sensors
@@ -297,8 +297,8 @@ class Permissions:
             return None, False
         if only_sensors and held is None and len(self.observers) >= MOST_OBSERVERS:
             return None, False
-        asked = holder, level, sensors
-        same = held is not None and (held.holder, held.level, held.sensors) == asked
+        terms = holder, level, sensors
+        same = held is not None and (held.holder, held.level, held.sensors) == terms
         session = held.session if held is not None and same else self._new_session(only_sensors)
         grant = Grant(robot, holder, level, session, sensors=sensors, address=address)
         self.changes += grant != held

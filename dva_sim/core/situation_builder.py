@@ -111,11 +111,11 @@ class SituationBuilder:
         events = self.orders.events
         rules = self.orders.rules
         if not (rules.containment or self.policy.preempts):
-            found = list(events.waiting.values())
+            tasks = list(events.waiting.values())
         else:
-            found = [e for e in events.open.values() if self._is_task(e)]
-        found.sort(key=operator.attrgetter("number"))
-        return found[:CONSIDERED]
+            tasks = [e for e in events.open.values() if self._is_task(e)]
+        tasks.sort(key=operator.attrgetter("number"))
+        return tasks[:CONSIDERED]
 
     def _is_task(self, event: Event) -> bool:
         if event.waits_for is not None:

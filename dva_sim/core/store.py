@@ -104,12 +104,12 @@ class Store:
         """
         try:
             (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            found = self._about("format") if tables else None
-            is_ours = found in (None, *OLDER, FORMAT)
+            version = self._about("format") if tables else None
+            is_ours = version in (None, *OLDER, FORMAT)
         except (sqlite3.OperationalError, ValueError) as error:
             if "no such" not in str(error):
                 raise self._useless(error) from None
-            found = None
+            version = None
             is_ours = False
         except sqlite3.Error as error:
             raise self._useless(error) from None
@@ -118,7 +118,7 @@ class Store:
         try:
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
-            self._file.executescript(_ALONE if found == FORMAT else _TABLES)
+            self._file.executescript(_ALONE if version == FORMAT else _TABLES)
             self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
         except sqlite3.Error as error:
             raise self._useless(error) from None
@@ -211,10 +211,10 @@ class Store:
             for e in self._events.values()
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
-        known = {i: e for i, e in self._devices.items() if e is not None}
-        devices = ((i, json.dumps(_of_entry(e, i in lasting))) for i, e in known.items())
+        changed = {i: e for i, e in self._devices.items() if e is not None}
+        devices = ((i, json.dumps(_of_entry(e, i in lasting))) for i, e in changed.items())
         put(_PUT_DEVICE, devices)
-        gone = self._devices.keys() - known.keys()
+        gone = self._devices.keys() - changed.keys()
         put("DELETE FROM devices WHERE id = ?", ((i,) for i in gone))
         for table, held in sessions.items():
             before = self._sessions[table]
@@ -241,11 +241,11 @@ class Store:
             ConfigError: what the file holds makes no sense.
         """
         try:
-            found = self._recall(dva, now)
+            has_memory = self._recall(dva, now)
         except (sqlite3.Error, ValueError, KeyError, TypeError) as error:
             raise self._useless(error) from None
         dva.check_access(now)
-        return found
+        return has_memory
 
     def _recall(self, dva: Dva, now: float) -> bool:
         self.past = self._time() - now
@@ -255,15 +255,15 @@ class Store:
                 silent.add(id_tag)
             else:
                 dva.registry.add(_entry(json.loads(data), now))
-        found = bool(dva.registry.entries)
+        has_memory = bool(dva.registry.entries)
         for state, count in self._counts().items():
             dva.events.counts[state] += count
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
-            found = True
-            kept = json.loads(data)
-            event = _event(kept, self.past)
+            has_memory = True
+            row = json.loads(data)
+            event = _event(row, self.past)
             dva.events.restore(event)
-            for name in kept["engaged"]:
+            for name in row["engaged"]:
                 dva.orders.engaged.begin(name, event)
         dva.events.total = sum(dva.events.counts.values())
         self._recall_sessions(dva, now)
@@ -272,7 +272,7 @@ class Store:
         dva.registry.changes()
         dva.events.changes()
         self._devices = dict.fromkeys(silent)  # is gone from the file with the next write
-        return found
+        return has_memory
 
     def _time(self) -> float:
         """Return the time of the last write [s]; older files hold events only."""
@@ -280,8 +280,8 @@ class Store:
             return self._about("time") / MICROSECONDS
         times = [0.0]
         for (data,) in self._file.execute("SELECT data FROM events"):
-            kept = json.loads(data)
-            times += [kept["waiting_since"], *kept["times"].values()]
+            row = json.loads(data)
+            times += [row["waiting_since"], *row["times"].values()]
         return max(times)
 
     def _counts(self) -> dict[State, int]:
@@ -292,9 +292,9 @@ class Store:
 
     def _recall_sessions(self, dva: Dva, now: float) -> None:
         permissions = dva.sessions.permissions
-        for table, kept in self._sessions.items():
+        for table, sessions in self._sessions.items():
             columns = f"{_KEYS[table]}, data"
-            kept |= self._file.execute(f"SELECT {columns} FROM {table} ORDER BY rowid")
+            sessions |= self._file.execute(f"SELECT {columns} FROM {table} ORDER BY rowid")
         for data in self._sessions["grants"].values():
             permissions.restore(_grant(json.loads(data)))
         for data in self._sessions["untold"].values():
@@ -307,8 +307,8 @@ class Store:
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _is_about(self, name: str) -> bool:
-        found = self._file.execute("SELECT 1 FROM about WHERE name = ?", (name,)).fetchone()
-        return found is not None
+        row = self._file.execute("SELECT 1 FROM about WHERE name = ?", (name,)).fetchone()
+        return row is not None
 
     def _about(self, name: str) -> int:
         row = self._file.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
@@ -345,16 +345,16 @@ def _of_event(event: Event, dva: Dva, past: float) -> dict[str, Any]:
     }
 
 
-def _event(kept: dict[str, Any], past: float) -> Event:
+def _event(row: dict[str, Any], past: float) -> Event:
     return Event(
-        **{name: kept[name] for name in _PLAIN},
-        position=Position(*kept["position"]),
-        state=State(kept["state"]),
-        waiting_since=kept["waiting_since"] - past,
-        times={step: time - past for step, time in kept["times"].items()},
-        failed=set(kept["failed"]),
-        sent=set(kept["sent"]),
-        handling=_handling(kept.get("handling"), past),
+        **{name: row[name] for name in _PLAIN},
+        position=Position(*row["position"]),
+        state=State(row["state"]),
+        waiting_since=row["waiting_since"] - past,
+        times={step: time - past for step, time in row["times"].items()},
+        failed=set(row["failed"]),
+        sent=set(row["sent"]),
+        handling=_handling(row.get("handling"), past),
     )
 
 
@@ -373,17 +373,17 @@ def _of_handling(handling: Handling, past: float) -> dict[str, Any] | None:
     }
 
 
-def _handling(kept: dict[str, Any] | None, past: float) -> Handling:
-    if kept is None:
+def _handling(row: dict[str, Any] | None, past: float) -> Handling:
+    if row is None:
         return Handling()
     return Handling(
-        decisions=kept["decisions"],
-        last=_choice(kept["last"], past),
-        acknowledged=_choice(kept["acknowledged"], past),
-        note=kept["note"],
-        taken_off=set(kept["taken_off"]),
-        expected={d: (sent - past, way) for d, (sent, way) in kept["expected"].items()},
-        advised=kept["advised"],
+        decisions=row["decisions"],
+        last=_choice(row["last"], past),
+        acknowledged=_choice(row["acknowledged"], past),
+        note=row["note"],
+        taken_off=set(row["taken_off"]),
+        expected={d: (sent - past, way) for d, (sent, way) in row["expected"].items()},
+        advised=row["advised"],
     )
 
 
@@ -391,10 +391,10 @@ def _of_choice(choice: Choice | None, past: float) -> list[Any] | None:
     return None if choice is None else [*choice._replace(time=choice.time + past)]
 
 
-def _choice(kept: list[Any] | None, past: float) -> Choice | None:
-    if kept is None:
+def _choice(row: list[Any] | None, past: float) -> Choice | None:
+    if row is None:
         return None
-    choice = Choice(*kept)
+    choice = Choice(*row)
     return choice._replace(time=choice.time - past)
 
 
@@ -435,8 +435,8 @@ def _plain(value: Device | Grant | PermissionRevocation) -> list[Any]:
     return [getattr(value, field.name) for field in fields(value)]
 
 
-def _grant(kept: list[Any]) -> Grant:
-    robot, holder, level, session, sensors, address = kept
+def _grant(row: list[Any]) -> Grant:
+    robot, holder, level, session, sensors, address = row
     return Grant(robot, holder, level, session, sensors=tuple(sensors), address=address)
 
 
@@ -446,6 +446,6 @@ def _of_entry(entry: DeviceEntry, lasts: bool) -> dict[str, Any]:
     return {"device": _plain(entry.device), "registrations": registrations, "silent": silent}
 
 
-def _entry(kept: dict[str, Any], now: float) -> DeviceEntry:
-    registrations = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
-    return DeviceEntry(Device(*kept["device"]), now, registrations=registrations)
+def _entry(row: dict[str, Any], now: float) -> DeviceEntry:
+    registrations = deque(((i, t) for i, t in row["registrations"]), maxlen=8)
+    return DeviceEntry(Device(*row["device"]), now, registrations=registrations)

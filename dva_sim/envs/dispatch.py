@@ -190,12 +190,12 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         Raises:
             ValueError: it is none of this environment.
         """
-        given = np.asarray(action)
+        number = np.asarray(action)
         count = len(self._mask)
-        is_whole = given.ndim == 0 and np.issubdtype(given.dtype, np.integer)
-        if not is_whole or not 0 <= given < count:
+        is_whole = number.ndim == 0 and np.issubdtype(number.dtype, np.integer)
+        if not is_whole or not 0 <= number < count:
             raise ValueError(f"an action is a whole number from 0 to {count - 1}, not {action!r}")
-        return int(given)
+        return int(number)
 
     def _action(self, piece: Advice) -> int:
         if not isinstance(piece, Relocation) and piece.task >= self._tasks:
@@ -398,10 +398,10 @@ def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> In
     while not over:
         assert inner.situation is not None
         advice = policy.advise(inner.situation, inner.policy_rng)
-        asked = inner.situation
+        situation = inner.situation
         actions = inner.actions_of(advice)
         for action in actions:
-            if over or inner.situation is not asked:
+            if over or inner.situation is not situation:
                 break  # nothing was left to decide
             _, reward, over, _, info = env.step(action)
             total += float(reward)

@@ -125,7 +125,9 @@ def chosen_of(study: Study, results: Results) -> TunedValues:
 def _tried(part: RunGrid, rule: Tuning, when: Setting, value: float) -> TriedValue:
     """Return one value, judged by `(persons, trials)` of the measure."""
     cell = part.where(part.grid(rule.measure), {**rule.at, **when, rule.key: value})
-    found = mean_interval(cell.ravel(), part.person)
-    low, high = (found.low, found.high) if found.n_persons > 1 else (found.mean, found.mean)
-    mean, low, high = (round(x, _DIGITS) for x in (found.mean, low, high))
+    interval = mean_interval(cell.ravel(), part.person)
+    low, high = (
+        (interval.low, interval.high) if interval.n_persons > 1 else (interval.mean, interval.mean)
+    )
+    mean, low, high = (round(x, _DIGITS) for x in (interval.mean, low, high))
     return TriedValue(when=when, value=value, mean=mean, low=low, high=high)

@@ -120,10 +120,10 @@ class Sparse(Config):
 
     def changed_by(self, other: Sparse) -> Sparse:
         """Return a copy with every key that `other` was given."""
-        given = {name: getattr(other, name) for name in other.model_fields_set}
+        changes = {name: getattr(other, name) for name in other.model_fields_set}
         inner = {
             name: getattr(self, name).changed_by(value)
-            for name, value in given.items()
+            for name, value in changes.items()
             if isinstance(value, Sparse)
         }
-        return self.model_copy(update=given | inner) if given else self
+        return self.model_copy(update=changes | inner) if changes else self

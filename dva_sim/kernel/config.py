@@ -101,15 +101,17 @@ def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
     """Return the keys that an unknown key may mean, for the same arguments as `meant`."""
     given = str(path[-1])
     here = fields_at(models[0], path[:-1])
-    known = {} if isinstance(value, Mapping) else _every_name(models)
-    exact = [key for name, key in known.items() if plain_name(name) == plain_name(_dotted(path))]
+    key_by_name = {} if isinstance(value, Mapping) else _every_name(models)
+    exact = [
+        key for name, key in key_by_name.items() if plain_name(name) == plain_name(_dotted(path))
+    ]
     if exact:
         return exact
     beside = {name: name for name in here} | {
         other: name for name, info in here.items() for other in _others(info)
     }
     near = guess(given, beside)
-    return _elsewhere(path, known) if near is None else [beside[near]]
+    return _elsewhere(path, key_by_name) if near is None else [beside[near]]
 
 
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
@@ -134,27 +136,27 @@ def model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for inner in getattr(annotation, "__args__", ()):
-        found = model_in(inner)
-        if found is not None:
-            return found
+        model = model_in(inner)
+        if model is not None:
+            return model
     return None
 
 
 def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
     """Return all dotted keys by their names, and by what else they are called."""
-    known: dict[str, str] = {}
+    key_by_name: dict[str, str] = {}
     for key, info in (item for model in models for item in fields_below(model)):
         for name in (key, *_others(info)):
-            known.setdefault(name, key)
-    return known
+            key_by_name.setdefault(name, key)
+    return key_by_name
 
 
-def _elsewhere(path: KeyPath, known: Mapping[str, str]) -> list[str]:
+def _elsewhere(path: KeyPath, key_by_name: Mapping[str, str]) -> list[str]:
     """Return keys in other places that are called so, or else the one most like it."""
     last = plain_name(str(path[-1]))
-    names = {name: plain_name(name.rpartition(".")[2]) for name in known}
+    names = {name: plain_name(name.rpartition(".")[2]) for name in key_by_name}
     near = last if last in names.values() else guess(last, names.values())
-    same = list(dict.fromkeys(known[name] for name, end in names.items() if end == near))
+    same = list(dict.fromkeys(key_by_name[name] for name, end in names.items() if end == near))
     least = min((key.count(".") for key in same), default=0)
     return [key for key in same if key.count(".") == least][:_MEANT]
 
@@ -211,26 +213,26 @@ _BOUNDS = {
 
 
 def first_mistake(
-    model: type[BaseModel], data: Mapping[str, Any], found: Sequence[Any]
+    model: type[BaseModel], data: Mapping[str, Any], errors: Sequence[Any]
 ) -> tuple[str, KeyPath]:
     """Return the first mistake, and the path of the key that it is about.
 
     Args:
         model: Model of the data.
         data: Plain data.
-        found: The errors of pydantic, at least one.
+        errors: The errors of pydantic, at least one.
     """
-    paths = [_path(e, data) for e in found]
-    if found[0]["type"] == "missing" and isinstance(paths[0][-1], str):
+    paths = [_path(e, data) for e in errors]
+    if errors[0]["type"] == "missing" and isinstance(paths[0][-1], str):
         beside = [
             _dotted(path)
-            for each, path in zip(found, paths, strict=True)
-            if each["type"] == "missing" and each["loc"][:-1] == found[0]["loc"][:-1]
+            for each, path in zip(errors, paths, strict=True)
+            if each["type"] == "missing" and each["loc"][:-1] == errors[0]["loc"][:-1]
         ]
         *others, last = map(repr, beside)
         text = f"missing keys {', '.join(others)} and {last}" if others else f"missing key {last}"
         return text, paths[0]
-    reports = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
+    reports = [e for e, path in zip(errors, paths, strict=True) if path == paths[0]]
     return _explain(model, reports, paths[0]), paths[0]
 
 
@@ -295,28 +297,28 @@ def _measure(info: Any, name: str, problem: Any) -> str:
 
 def _given(problem: Any, message: str) -> str:
     """Return the value there is, unless it is long or has been told already."""
-    given = problem["input"]
-    if given is None:
+    value = problem["input"]
+    if value is None:
         return ", not null" if problem["type"] != "value_error" else ""
-    shown = repr(given)
-    if not isinstance(given, str | int | float | bool):
+    text = repr(value)
+    if not isinstance(value, str | int | float | bool):
         return ""
-    if problem["type"] == "value_error" and shown in message:
+    if problem["type"] == "value_error" and text in message:
         return ""
-    return f", not {shown if len(shown) <= _SHOWN else shown[:_SHOWN] + '...'}"
+    return f", not {text if len(text) <= _SHOWN else text[:_SHOWN] + '...'}"
 
 
 def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
     """Suggest what to write instead, where that can be guessed."""
-    given = problems[0]["input"]
+    value = problems[0]["input"]
     kinds = {problem["type"] for problem in problems}
-    if isinstance(given, str) and "float_type" in kinds:
-        number = as_number(str(path[-1]) if path else "", given)
+    if isinstance(value, str) and "float_type" in kinds:
+        number = as_number(str(path[-1]) if path else "", value)
         return f"; write {number}" if number else ""
-    if isinstance(given, str) and "literal_error" in kinds:
-        near = guess(given, _choices(problems[0]))
+    if isinstance(value, str) and "literal_error" in kinds:
+        near = guess(value, _choices(problems[0]))
         return f"; did you mean {near!r}?" if near is not None else ""
-    if kinds & {"model_type", "model_attributes_type"} and not isinstance(given, list | dict):
+    if kinds & {"model_type", "model_attributes_type"} and not isinstance(value, list | dict):
         keys = list(fields_at(model, path))
         return f", such as {_dotted((*path, keys[0]))}" if keys and path else ""
     return ""

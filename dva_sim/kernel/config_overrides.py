@@ -87,8 +87,8 @@ def blame(
     def mistake(some: Mapping[str, Any]) -> ConfigError | None:
         try:
             make(some)
-        except ConfigError as found:
-            return found
+        except ConfigError as error:
+            return error
         return None
 
     if not changes or mistake({}) is not None:
@@ -104,10 +104,10 @@ def blame(
 
 def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
     """Return a mistake of changes that were given as `--set key=value`, told with these words."""
-    given = {pair.partition("=")[0].strip(): pair for pair in pairs}
+    pair_by_key = {pair.partition("=")[0].strip(): pair for pair in pairs}
     if error.file is not None or not error.keys:
         return error
-    text = ", ".join(f"--set {_cut(given[key])}" for key in error.keys)
+    text = ", ".join(f"--set {_cut(pair_by_key[key])}" for key in error.keys)
     return ConfigError(f"{text}: {error.problem.removeprefix(f'{error.keys[0]}: ')}")
 
 

@@ -55,8 +55,8 @@ def look_of(label: str) -> str:
 def with_id(label: str, id_tag: str) -> str:
     """Return a label that no other device has, no longer than a message may hold."""
     beside = f" ({id_tag})"
-    shown = visible(label).strip()[: LONGEST - len(beside)]
-    return f"{shown}{beside}" if shown else id_tag
+    visible_label = visible(label).strip()[: LONGEST - len(beside)]
+    return f"{visible_label}{beside}" if visible_label else id_tag
 
 
 def distinct(label: str, id_tag: str, others: Iterable[str]) -> str:

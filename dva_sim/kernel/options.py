@@ -45,29 +45,29 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
     return value
 
 
-def one_of(name: str, value: Any, known: Collection[str]) -> str:
+def one_of(name: str, value: Any, words: Collection[str]) -> str:
     """Return one of some words.
 
     Raises:
         ConfigError: it is not.
     """
-    if not isinstance(value, str) or value not in known:
-        raise _wrong(name, value, f"one of {', '.join(sorted(known))}")
+    if not isinstance(value, str) or value not in words:
+        raise _wrong(name, value, f"one of {', '.join(sorted(words))}")
     return value
 
 
-def some_of(name: str, value: Any, known: Collection[str]) -> frozenset[str]:
+def some_of(name: str, value: Any, allowed: Collection[str]) -> frozenset[str]:
     """Return any number of some words.
 
     Raises:
         ConfigError: not a list, or another word.
     """
-    wanted = f"a list of some of {', '.join(sorted(known))}"
+    valid = f"a list of some of {', '.join(sorted(allowed))}"
     if isinstance(value, str) or not isinstance(value, Iterable):
-        raise _wrong(name, value, wanted)
+        raise _wrong(name, value, valid)
     words = list(value)
-    if not all(isinstance(word, str) and word in known for word in words):
-        raise _wrong(name, words, wanted)
+    if not all(isinstance(word, str) and word in allowed for word in words):
+        raise _wrong(name, words, valid)
     return frozenset(words)
 
 
@@ -79,5 +79,5 @@ def _range(least: float, above: float, most: float, below: float) -> str:
     return ", ".join(f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound))
 
 
-def _wrong(name: str, value: Any, wanted: str) -> ConfigError:
-    return ConfigError(f"option {name!r} is {value!r}; should be {wanted}")
+def _wrong(name: str, value: Any, valid: str) -> ConfigError:
+    return ConfigError(f"option {name!r} is {value!r}; should be {valid}")

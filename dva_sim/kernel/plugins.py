@@ -71,8 +71,8 @@ class Plugins(Generic[T]):
 
     def files(self) -> list[Path]:
         """Return files in `folder`, whose classes can be named without their path."""
-        found = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
-        return sorted({path.resolve(): None for path in found})
+        paths = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
+        return sorted({path.resolve(): None for path in paths})
 
     def load(
         self,
@@ -95,9 +95,9 @@ class Plugins(Generic[T]):
         word = word_of(name)
         finish = None if factory in self.shipped.values() else self.finish
 
-        def made(*given: Any) -> T:
+        def made(*arguments: Any) -> T:
             options_of_one = copy.deepcopy(own)  # what it does to them, the next does not see
-            one = self.make(word, factory, options_of_one, *given)
+            one = self.make(word, factory, options_of_one, *arguments)
             return one if finish is None else self.ask(word, partial(finish, one))
 
         return made
@@ -125,21 +125,21 @@ class Plugins(Generic[T]):
         Raises:
             ConfigError: there is no such file.
         """
-        file, colon, wanted = name.rpartition(":")
+        file, colon, class_name = name.rpartition(":")
         if not colon or not file.endswith(".py"):
             return name
-        return f"{self._find_file(name, file, base)}:{wanted}"
+        return f"{self._find_file(name, file, base)}:{class_name}"
 
     def make(
-        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *given: Any
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *arguments: Any
     ) -> T:
         """Make one of a class that was found, from options and from what it is always given.
 
         Raises:
             ConfigError: an option is unknown or bad, or it cannot be made.
         """
-        self._check_options(name, factory, options, len(given))
-        return self.ask(name, lambda: factory(*given, **options))
+        self._check_options(name, factory, options, len(arguments))
+        return self.ask(name, lambda: factory(*arguments, **options))
 
     def ask(self, name: str, what: Callable[[], A]) -> A:
         """Do what runs code of one that was found, and tell what is wrong with that.
@@ -156,37 +156,41 @@ class Plugins(Generic[T]):
             raise ConfigError(problem) from error
 
     def _check_options(
-        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], given: int
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], positional: int
     ) -> None:
         if not options:
             return
-        parameters = list(inspect.signature(factory).parameters.values())[given:]
+        parameters = list(inspect.signature(factory).parameters.values())[positional:]
         if any(p.kind is p.VAR_KEYWORD for p in parameters):
             return
-        known = [p.name for p in parameters if p.kind not in (p.POSITIONAL_ONLY, p.VAR_POSITIONAL)]
+        parameters_named = [
+            p.name for p in parameters if p.kind not in (p.POSITIONAL_ONLY, p.VAR_POSITIONAL)
+        ]
         for option in options:
-            if option not in known:
-                there = hint(option, known) if known else "it has none"
+            if option not in parameters_named:
+                there = hint(option, parameters_named) if parameters_named else "it has none"
                 raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {there}")
 
     # --- files -------------------------------------------------------------------------
 
     def _from_file(self, name: str, base: Path | None) -> type[T] | None:
         """Return the class that `file.py:Class` means; None if the name is not of that form."""
-        file, colon, wanted = name.rpartition(":")
+        file, colon, class_name = name.rpartition(":")
         if not colon and name.endswith(".py"):
             raise ConfigError(f"{self.kind} {name!r} should name a class too, as {name}:Mine")
         if not colon or not file.endswith(".py"):
             return None
         path = self._find_file(name, file, base)
         module = _run(path, self.kind)
-        found = vars(module).get(wanted)
-        if found is None:
+        plugin = vars(module).get(class_name)
+        if plugin is None:
             classes = [c for c in vars(module).values() if isinstance(c, type)]
             there = [c.__name__ for c in classes if c.__module__ == module.__name__]
-            problem = f"there is no class {wanted!r} in {path}; {hint(wanted, there, 'classes')}"
+            problem = (
+                f"there is no class {class_name!r} in {path}; {hint(class_name, there, 'classes')}"
+            )
             raise ConfigError(f"{self.kind} {name!r}: {problem}")
-        return self._right_class(name, found)
+        return self._right_class(name, plugin)
 
     def _find_file(self, name: str, file: str, base: Path | None) -> Path:
         folders = [] if base is None else [base]
@@ -209,21 +213,21 @@ class Plugins(Generic[T]):
             more = "" if problem.endswith("?") else "; or a file: mine.py:Mine"
             raise ConfigError(problem + more)
         try:
-            found = offers[name].load()
+            plugin = offers[name].load()
         except FAILURES as error:
             problem = f"{offers[name].value} cannot be loaded: {error_text(error)}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
-        return self._right_class(name, found)
+        return self._right_class(name, plugin)
 
-    def _right_class(self, name: str, found: Any) -> type[T]:
+    def _right_class(self, name: str, plugin: Any) -> type[T]:
         base = self.base
-        if not (isinstance(found, type) and issubclass(found, base)):
-            wanted = f"should be a class derived from {self.public}"
-            raise ConfigError(f"{self.kind} {name!r} is not a {self.kind}; {wanted}")
+        if not (isinstance(plugin, type) and issubclass(plugin, base)):
+            expected = f"should be a class derived from {self.public}"
+            raise ConfigError(f"{self.kind} {name!r} is not a {self.kind}; {expected}")
         method = self.needs.partition("(")[0]
-        if getattr(found, method) is getattr(base, method):
+        if getattr(plugin, method) is getattr(base, method):
             raise ConfigError(f"{self.kind} {name!r} has no {self.needs}; should define it")
-        return found
+        return plugin
 
 
 class Guard:
@@ -237,10 +241,10 @@ class Guard:
     failures: int
     first_failure: str
 
-    def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
+    def _answer(self, ask: Callable[..., Any], *arguments: Any) -> tuple[float, float] | None:
         """Return two finite numbers, or None."""
         try:
-            one, other = ask(*given)
+            one, other = ask(*arguments)
             if math.isfinite(one) and math.isfinite(other):
                 return float(one), float(other)
             self._count(f"answers {one!r}, {other!r}")

@@ -31,11 +31,11 @@ _UNITS: Final[dict[str, dict[str, float]]] = {
 
 def as_number(key: str, text: str) -> str:
     """Suggest the number that a text means as a key's value, as `0.5` for `500ms`; else empty."""
-    found = _QUANTITY.fullmatch(text.strip())
-    if found is None:
+    match = _QUANTITY.fullmatch(text.strip())
+    if match is None:
         return ""
-    value = float(found[1].replace(",", "."))
-    unit = found[2].casefold()
+    value = float(match[1].replace(",", "."))
+    unit = match[2].casefold()
     ending = key.rpartition("_")[2]
     factors = _UNITS.get(ending, _UNITS[""]) if "_" in key else _UNITS[""]
     factor = 1.0 if not unit else factors.get(unit)

@@ -20,18 +20,18 @@ def guess(given: str, known: Iterable[str]) -> str | None:
     A good guess differs by few slips, has the name as half of it or more, or is the only one that
     begins with it.
     """
-    wanted = plain_name(given)
+    plain_given = plain_name(given)
     names = list(known)
-    if not wanted:
+    if not plain_given:
         return None
-    slips = {name: _slips(wanted, plain_name(name)) for name in names}
+    slips = {name: _slips(plain_given, plain_name(name)) for name in names}
     near = min(slips, key=lambda name: slips[name], default=None)
-    if near is not None and slips[near] <= (len(wanted) + 1) // _A_SLIP:
-        exchanged = sorted(wanted) == sorted(plain_name(near))
-        if len(wanted) > _LETTERS or (len(wanted) == _LETTERS and exchanged):
+    if near is not None and slips[near] <= (len(plain_given) + 1) // _A_SLIP:
+        exchanged = sorted(plain_given) == sorted(plain_name(near))
+        if len(plain_given) > _LETTERS or (len(plain_given) == _LETTERS and exchanged):
             return near
-    begun = {name: plain_name(name) for name in names if _begins(wanted, plain_name(name))}
-    halves = [name for name, plain in begun.items() if _is_half(wanted, plain)]
+    begun = {name: plain_name(name) for name in names if _begins(plain_given, plain_name(name))}
+    halves = [name for name, plain in begun.items() if _is_half(plain_given, plain)]
     return halves[0] if halves else next(iter(begun)) if len(begun) == 1 else None
 
 

@@ -69,9 +69,9 @@ def in_words(error: Any) -> tuple[str, Place]:
     """
     problem = str(error.problem or "").split("\n")[0]
     for entry in _WORDS:
-        if found := re.search(entry.theirs, problem):
+        if match := re.search(entry.theirs, problem):
             mark = error.context_mark if entry.is_at_begin else None
-            return entry.ours.format(*found.groups()), _place(mark or error.problem_mark)
+            return entry.ours.format(*match.groups()), _place(mark or error.problem_mark)
     for sign, word in _SIGNS.items():
         problem = problem.replace(sign, word)
     if not problem or re.match(_THEIRS, problem):

@@ -132,9 +132,9 @@ class LiveJudge:
     def news(self) -> list[Moment]:
         """Return what was found since the last call, for the timeline; of each rule the first."""
         with self._lock:
-            found = self._judge.recorder.timeline
+            moments = self._judge.recorder.timeline
             self._judge.recorder.timeline = []
-            return found
+            return moments
 
     def verdicts(self) -> list[Verdict]:
         """Return the verdict on each rule, once all parts have ended.

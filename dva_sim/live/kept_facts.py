@@ -10,39 +10,39 @@ from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD, Run
 
 
-def keep_events(kept: LiveRecorder, events: EventTable) -> None:
+def keep_events(recorder: LiveRecorder, events: EventTable) -> None:
     """Record how the events stand: the last that were closed, and all that are open."""
     for e in (*events.closed.values(), *events.open.values()):
         at = [e.position.latitude, e.position.longitude]
         sent = {who: getattr(e, who) for who in SENT}
         facts = e.number, e.kind, at, e.state.value, dict(e.times), e.severity, sent
-        kept.put_new("event", *facts, key=f"event {e.number}")
+        recorder.put_new("event", *facts, key=f"event {e.number}")
 
 
-def keep_team(kept: LiveRecorder, labels: dict[str, str], field: Field) -> None:
+def keep_team(recorder: LiveRecorder, labels: dict[str, str], field: Field) -> None:
     """Record the team, and which hazards are dealt with."""
     radii = {name: robot.body.spec.radius for name, robot in field.robots.items()}
-    kept.put_new("team", dict(labels), radii, key="team")
+    recorder.put_new("team", dict(labels), radii, key="team")
     for number, when in field.contained.items():
-        kept.put_new("contains", number, when, key=f"contained {number}")
+        recorder.put_new("contains", number, when, key=f"contained {number}")
 
 
-def keep_places(kept: LiveRecorder, field: Field, now: float) -> None:
+def keep_places(recorder: LiveRecorder, field: Field, now: float) -> None:
     """Record where everybody is."""
-    kept.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
+    recorder.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
 
 
-def keep_run(run: Run, kept: LiveRecorder) -> None:
+def keep_run(run: Run, recorder: LiveRecorder) -> None:
     """Record all facts of a run in this process, from now on."""
     field = run.field
     clock = run.clock
 
     def facts() -> None:
-        keep_team(kept, run.stage.labels, field)
-        keep_events(kept, run.dva.core.events)
+        keep_team(recorder, run.stage.labels, field)
+        keep_events(recorder, run.dva.core.events)
 
     log = FactLog(
-        kept.observe,
+        recorder.observe,
         robots=field.robots,
         look=lambda robot: motion_of(field.robots[robot]),
         page=lambda _: page_of(run.dva),
@@ -50,6 +50,6 @@ def keep_run(run: Run, kept: LiveRecorder) -> None:
     )
     facts()
     run.observe(log)
-    clock.every(FILM_PERIOD, lambda: keep_places(kept, field, clock.now))
+    clock.every(FILM_PERIOD, lambda: keep_places(recorder, field, clock.now))
     clock.every(WATCH_PERIOD, lambda: log.places(clock.now, field.places()))
     clock.every(1.0, facts)

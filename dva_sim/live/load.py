@@ -82,10 +82,10 @@ class LoadFigures:
 
 def percentiles(name: str, times: Iterable[float]) -> dict[str, float]:
     """Return the percentiles of some times [s] by column; nan without any."""
-    found = np.percentile(list(times) or [math.nan], PERCENTILES)
+    values = np.percentile(list(times) or [math.nan], PERCENTILES)
     return {
         f"{name}_p{word}_s": float(value)
-        for word, value in zip(("50", "99", "999"), found, strict=True)
+        for word, value in zip(("50", "99", "999"), values, strict=True)
     }
 
 
@@ -96,12 +96,12 @@ def order_times(
     orders: Times = defaultdict(list)
     for place, time in sorted(ordered, key=lambda pair: pair[1]):
         orders[place].append(time)
-    found = []
+    waits = []
     for place, time in sorted(reported, key=lambda pair: pair[1]):
         at = bisect_left(orders[place], time)
         if at < len(orders[place]):  # else it became part of an event that had an order
-            found.append(orders[place].pop(at) - time)
-    return found
+            waits.append(orders[place].pop(at) - time)
+    return waits
 
 
 def figures_of(
@@ -132,11 +132,11 @@ def figures_of(
     joined = sum(counts["joined"] for counts in every)
     late = max(counts["late"] for counts in every)
     slowest = requests["requests_p99_s"]
-    asked = answered + lost.total()
+    n_requests = answered + lost.total()
     signs = {
         f"the load itself was late by {late:.2f} s, so take more processes": late > MOST_LATE_S / 2,
         f"p99 of replies {slowest:.2f} s": slowest > MOST_LATE_S,
-        f"{missed} of {asked} requests lost or refused": missed > MOST_LOST * asked,
+        f"{missed} of {n_requests} requests lost or refused": missed > MOST_LOST * n_requests,
         f"{joined} of {devices} devices joined": joined < (1 - MOST_LOST) * devices,
     }
     return LoadFigures(

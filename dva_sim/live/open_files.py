@@ -35,11 +35,11 @@ def check_room_for(devices: int) -> None:
         DvaSimError: how many files may be open, and how many it takes.
     """
     usable = _usable()
-    wanted = APART + devices * PER_DEVICE
-    if usable < wanted:
+    needed = APART + devices * PER_DEVICE
+    if usable < needed:
         raise DvaSimError(
-            f"a process may open {usable} files here, and {devices} devices take {wanted}; "
-            f"allow more first: ulimit -n {max(1024, wanted)}"
+            f"a process may open {usable} files here, and {devices} devices take {needed}; "
+            f"allow more first: ulimit -n {max(1024, needed)}"
         )
 
 

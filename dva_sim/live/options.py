@@ -67,11 +67,11 @@ def addresses_of(options: LiveOptions) -> list[str]:
 
 def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
     """Refuse what several DVAs cannot do over sockets, and addresses that are not one for each."""
-    given = len(addresses_of(options))
+    addresses = len(addresses_of(options))
     count = max(1, len(scenario.dva.regions))
-    if given not in (0, count):
+    if addresses not in (0, count):
         has = f"{count} regions" if scenario.dva.regions else "one DVA"
-        raise ConfigError(f"--dva names {given} addresses, and the scenario has {has}")
+        raise ConfigError(f"--dva names {addresses} addresses, and the scenario has {has}")
     if scenario.dva.deaths:
         raise ConfigError("dva.deaths: only in virtual time; end the process of a DVA instead")
     if scenario.dva.backbone is not None:
@@ -113,8 +113,8 @@ def check(options: LiveOptions) -> Scenario:
     try:
         rehearse(scenario, options.seed)
     except ConfigError as error:
-        found = blame(error, parse_changes(changes), make, document)
-        raise set_by(changes, found) from None
+        mistake = blame(error, parse_changes(changes), make, document)
+        raise set_by(changes, mistake) from None
     if options.record is not None:
         _check_record(options, options.record)
     return scenario
@@ -127,9 +127,10 @@ def _check_emulated(options: LiveOptions, scenario: Scenario) -> None:
         "--host": options.host != LOCALHOST,
         "--camera-port": options.camera_port is not None,
     }
-    if given := [name for name, is_given in others.items() if is_given]:
+    if excluded := [name for name, is_given in others.items() if is_given]:
         raise ConfigError(
-            f"{given[0]} cannot be given with --link, where all parts run in networks of their own"
+            f"{excluded[0]} cannot be given with --link, where all parts run in networks of their "
+            "own"
         )
     check_emulated(scenario.link, options.seed)
 
@@ -172,18 +173,18 @@ def changes_of(options: LiveOptions | ConsoleOptions) -> tuple[str, ...]:
     return (*options.set, *changes_by_link(options.link))
 
 
-def changes_by_link(given: Sequence[str]) -> tuple[str, ...]:
+def changes_by_link(words: Sequence[str]) -> tuple[str, ...]:
     """Return the changes of a scenario, as `KEY=VALUE`, that give it the emulated link.
 
     Args:
-        given: Keys of the link with new values, and at most one file of a link, which takes the
+        words: Keys of the link with new values, and at most one file of a link, which takes the
             place of the scenario's; `scenario` is the scenario's own.
 
     Raises:
         ConfigError: it is not a valid link.
     """
-    pairs = [text for text in given if "=" in text]
-    files = [text for text in given if "=" not in text and text != AS_IN_SCENARIO]
+    pairs = [text for text in words if "=" in text]
+    files = [text for text in words if "=" not in text and text != AS_IN_SCENARIO]
     if len(files) > 1:
         raise ConfigError(f"--link {files[1]}: a link is in one file, and {files[0]} is one")
     try:

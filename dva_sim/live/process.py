@@ -267,16 +267,16 @@ def _joining(
     network: RealNetwork, options: LiveOptions, name: str, of: int
 ) -> Callable[[str, int], str]:
     """Return a function that gives each new device of this process two ports, and its address."""
-    given = options.port
+    next_port = options.port
 
     def join(kind: str, number: int) -> str:
-        nonlocal given
+        nonlocal next_port
         host = options.host
-        port = given
+        port = next_port
         if name == "dva" and options.dva is not None:
             host, port = split_address(addresses_of(options)[of - 1])
-        elif given:
-            given += 2
+        elif next_port:
+            next_port += 2
         return network.join(id_of(kind, number), host, port)
 
     return join

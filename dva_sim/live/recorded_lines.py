@@ -91,25 +91,25 @@ def is_part(file: Path) -> bool:
 
 
 @contextmanager
-def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
+def readable(file: Path, to: Path | None = None) -> Iterator[Path]:
     """Yield a recording to read: the file itself, or one made of its lines for the moment.
 
     Args:
         file: A recording, or the lines of a run.
-        kept: Path at which to keep the recording that is made, if wanted.
+        to: Path at which to keep the recording that is made, if wanted.
 
     Raises:
         DvaSimError: it cannot be made, or there is nothing to be made.
     """
     if not is_part(file):
-        if kept is not None:
+        if to is not None:
             raise ConfigError(f"is already a recording; --mcap is for a {SUFFIX}{PART} file", file)
         yield file
         return
-    if kept is not None:
-        check_target(kept, way="give another name")
-        record(file, kept)
-        yield kept
+    if to is not None:
+        check_target(to, way="give another name")
+        record(file, to)
+        yield to
         return
     with TemporaryDirectory(prefix="dva-sim-") as folder:
         made = Path(folder) / file.stem
@@ -254,10 +254,10 @@ class RunLines:
 
     def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
         robot, who, event, ordered, started, ended, outcome = facts
-        known = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
-        known.started = started
-        known.ended = ended
-        known.outcome = outcome
+        log = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
+        log.started = started
+        log.ended = ended
+        log.outcome = outcome
 
     def _drove(self, operator: str, number: int, seen: Line, made: Line) -> None:
         drive = self._drives[operator, number]

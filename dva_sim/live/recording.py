@@ -103,10 +103,10 @@ class LiveRecorder(Recorder):
         """Keep a line, of strangers or of no fact only while enough room is left for our facts."""
         if not self.keeps and line[0] not in JUDGED:
             return True
-        kept = self._notes_gaps() and self._put(line, spare=of_strangers or not is_fact)
-        if is_fact and not kept:
+        is_kept = self._notes_gaps() and self._put(line, spare=of_strangers or not is_fact)
+        if is_fact and not is_kept:
             self._lose(of_strangers)
-        return kept
+        return is_kept
 
     def _lose(self, of_strangers: bool) -> None:
         """Note that a fact could not be kept."""
@@ -139,9 +139,9 @@ class LiveRecorder(Recorder):
         has_room = self._left() > (SPARE * BYTES_PER_SECOND if spare else 0)
         data = json.dumps(line).encode() if has_room else b""
         self._room -= len(data)
-        kept = bool(data) and self._outlet.offer(data + b"\n")
-        self.counters[_NOT_KEPT] += not kept
-        return kept
+        is_kept = bool(data) and self._outlet.offer(data + b"\n")
+        self.counters[_NOT_KEPT] += not is_kept
+        return is_kept
 
     def put_new(self, *line: Any, key: str) -> None:
         """Keep a line if it says something else than the last one of that key."""
@@ -463,11 +463,11 @@ class RunKeeping:
 
     def news(self) -> list[Moment]:
         """Return the rules that were found broken since the last call; they are recorded, too."""
-        found = self._judge.news()
+        moments = self._judge.news()
         if self._keeper is not None:
-            for moment in found:
+            for moment in moments:
                 self._keeper.keep(json.dumps(["told", *moment]).encode() + b"\n")
-        return found
+        return moments
 
     def finish(self) -> str | None:
         """Make the recording when all parts have ended; see `Keeper`."""

@@ -280,12 +280,12 @@ class Supervisor:
 
     def _tell_broken_rules(self) -> None:
         """Report the rules that were found broken since the last look."""
-        found = [list(moment) for moment in self._keeping.news()] if self._keeping else []
-        self._tell("rules", found)
+        moments = [list(moment) for moment in self._keeping.news()] if self._keeping else []
+        self._tell("rules", moments)
 
-    def _tell(self, part: str, found: list[list[Any]]) -> None:
+    def _tell(self, part: str, story: list[list[Any]]) -> None:
         """Report lines of the timeline that no part has told."""
-        if found:
+        if story:
             now = time.monotonic() - self._epoch
             self._hear(
                 part,
@@ -295,7 +295,7 @@ class Supervisor:
                     time=now,
                     rows=[],
                     events=[],
-                    story=found,
+                    story=story,
                     counters={},
                     settled=True,
                     dva=None,

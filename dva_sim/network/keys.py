@@ -74,14 +74,14 @@ class KeyRing:
         before = self._public
         files = dict[Path, tuple[str, bytes]]()
         for file in sorted(seen):
-            known = self._files.get(file)
-            if known is None or seen[file] != self._seen.get(file):
+            key = self._files.get(file)
+            if key is None or seen[file] != self._seen.get(file):
                 try:
-                    known = _read_public(file)
+                    key = _read_public(file)
                 except ConfigError:
                     del seen[file]
-            if known is not None:
-                files[file] = known
+            if key is not None:
+                files[file] = key
         self._files = files
         self._seen = seen
         self._public = {}
@@ -95,18 +95,18 @@ class KeyRing:
     def _look(self) -> dict[Path, tuple[int, int]]:
         """Return the time of change and the size of each public file."""
         folder = self.folder / "public"
-        found = dict[Path, tuple[int, int]]()
+        files = dict[Path, tuple[int, int]]()
         try:
             for entry in os.scandir(folder):
                 if entry.name.endswith(".key"):
                     about = entry.stat()
-                    found[folder / entry.name] = about.st_mtime_ns, about.st_size
+                    files[folder / entry.name] = about.st_mtime_ns, about.st_size
         except FileNotFoundError as error:
             if Path(error.filename or folder) == folder:
                 raise ConfigError(_NO_KEYS, self.folder) from None
         except OSError as error:
             raise ConfigError(f"cannot be read: {error.strerror}", folder) from error
-        return found
+        return files
 
     @property
     def devices(self) -> list[str]:

@@ -52,11 +52,11 @@ def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
         raise ConfigError(f"cannot be read as a table: {error}", path) from None
     except ValueError as error:
         raise ConfigError(f"times should be numbers: {error}", path) from None
-    found = groups.get(tuple(map(str, where.values())))
-    if found is None:
+    runs = groups.get(tuple(map(str, where.values())))
+    if runs is None:
         place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
         raise ConfigError(f"of {place}, no command was measured", path)
-    return found
+    return runs
 
 
 @read_once(lambda path: [path], most=2)

@@ -216,15 +216,15 @@ class Requester:
     def renew(self) -> None:
         """Renew the connection to a peer elsewhere: what is under way is sent again."""
         self._disconnect()
-        for asked in list(self._open.values()):
-            self._attempt(asked)
+        for request in list(self._open.values()):
+            self._attempt(request)
 
     def give_up(self) -> None:
         """Give up a peer that has gone for good: whatever waits has failed."""
         waiting = [*self._open.values(), *self._queue]
         self.close()
-        for asked in waiting:
-            asked.on_failure()
+        for request in waiting:
+            request.on_failure()
 
     def close(self) -> None:
         """Forget everything, without a word to those who wait."""
@@ -234,24 +234,24 @@ class Requester:
 
     def _fill(self) -> None:
         while self._queue and len(self._open) < self._window:
-            asked = self._queue.popleft()
-            asked.sent_at = self._clock.now
-            self._open[asked.tag] = asked
-            self._attempt(asked)
+            request = self._queue.popleft()
+            request.sent_at = self._clock.now
+            self._open[request.tag] = request
+            self._attempt(request)
 
-    def _attempt(self, asked: _Asked) -> None:
+    def _attempt(self, request: _Asked) -> None:
         """Send a request, over a new connection if there is none."""
-        asked.attempts += 1
+        request.attempts += 1
         if len(self._deadlines) > MOST_ANSWERED + 2 * len(self._open):
             # The first stays, as its event is on its way.
             first, *others = self._deadlines
             self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])
-        self._deadlines.append((self._clock.now + self.timeout, asked.tag, asked.attempts))
+        self._deadlines.append((self._clock.now + self.timeout, request.tag, request.attempts))
         if len(self._deadlines) == 1:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
         self.open()
         assert self._wire is not None
-        self._wire.send(asked.tag, asked.data)
+        self._wire.send(request.tag, request.data)
 
     def _disconnect(self) -> None:
         if self._wire is not None:
@@ -259,11 +259,11 @@ class Requester:
         self._wire = None
 
     def _on_reply(self, tag: int, reply: bytes) -> None:
-        asked = self._open.pop(tag, None)
-        if asked is None:
+        request = self._open.pop(tag, None)
+        if request is None:
             return  # doubled, or to a request that was given up
-        self.round_trips.append(self._clock.now - asked.sent_at)
-        asked.on_reply(reply)
+        self.round_trips.append(self._clock.now - request.sent_at)
+        request.on_reply(reply)
         self._fill()
 
     def _look_at_deadlines(self) -> None:
@@ -280,17 +280,17 @@ class Requester:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
 
     def _expire(self, tag: int, attempt: int) -> None:
-        asked = self._open.get(tag)
-        if asked is None or asked.attempts != attempt:
+        request = self._open.get(tag)
+        if request is None or request.attempts != attempt:
             return
         self.timeouts += 1
         self.on_timeout()
         if self._window == 1:
             self._disconnect()
         if attempt < self._attempts:
-            self._attempt(asked)
+            self._attempt(request)
             return
         self.failures += 1
         del self._open[tag]
-        asked.on_failure()
+        request.on_failure()
         self._fill()

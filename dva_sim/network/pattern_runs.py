@@ -124,11 +124,11 @@ class Condition:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pattern", COLUMN_WORDS.get(self.pattern, self.pattern))
-        for name, known in _CHOICES.items():
-            if getattr(self, name) not in known:
-                raise ConfigError(unknown(name, getattr(self, name), known))
-        given = [value is not None for value in (self.timeout_ms, self.attempts)]
-        if given != [self.pattern == "req-rep"] * 2:
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise ConfigError(unknown(name, getattr(self, name), choices))
+        is_given = [value is not None for value in (self.timeout_ms, self.attempts)]
+        if is_given != [self.pattern == "req-rep"] * 2:
             raise ConfigError("timeout_ms and attempts belong to pattern req-rep, and only to it")
         if self.conflate != "none" and self.pattern != "pub-sub":
             raise ConfigError(
@@ -375,25 +375,25 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     sent = _within(issued, warm_s, end)
     inside = _within(applied, warm_s, end)
     distinct = len(set(numbers[inside].tolist()))
-    found: Measures = {"n_sent": int(sent.sum()), "n_applied": int(inside.sum())}
-    found |= {"n_distinct": distinct, "dup": found["n_applied"] - distinct}
-    found |= {"send_hz": found["n_sent"] / dur_s, "applied_hz": distinct / dur_s}
-    found["skip_frac"] = _skipped(np.flatnonzero(sent), numbers[inside])
-    found["first_seq"] = float(numbers.min()) if len(numbers) else math.nan
-    found |= summary("age", applied[inside] - issued[numbers[inside]])
+    measures: Measures = {"n_sent": int(sent.sum()), "n_applied": int(inside.sum())}
+    measures |= {"n_distinct": distinct, "dup": measures["n_applied"] - distinct}
+    measures |= {"send_hz": measures["n_sent"] / dur_s, "applied_hz": distinct / dur_s}
+    measures["skip_frac"] = _skipped(np.flatnonzero(sent), numbers[inside])
+    measures["first_seq"] = float(numbers.min()) if len(numbers) else math.nan
+    measures |= summary("age", applied[inside] - issued[numbers[inside]])
     trips = [
         when - log.start - issued[number]
         for number, when in log.replied
         if sent[number] and when - log.start < end
     ]
-    found |= summary("rtt", np.array(trips))
+    measures |= summary("rtt", np.array(trips))
     looks = np.asarray(warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S)))
-    found |= summary("stale", AgeInForce(issued[numbers], applied, 0.0).at(looks))
+    measures |= summary("stale", AgeInForce(issued[numbers], applied, 0.0).at(looks))
     gaps = np.diff(np.concatenate([[warm_s], applied[inside], [end]])) * MS
-    found |= {"gap_p95": float(np.percentile(gaps, 95)), "gap_max": float(gaps.max())}
+    measures |= {"gap_p95": float(np.percentile(gaps, 95)), "gap_max": float(gaps.max())}
     for name, times in (("timeouts", log.timeouts), ("alerts", log.alerts)):
-        found[name] = int(_within(np.array(times) - log.start, warm_s, end).sum())
-    return found | {"t_conn_ms": log.connected_s * MS, "t_hs_ms": log.handshake_s * MS}
+        measures[name] = int(_within(np.array(times) - log.start, warm_s, end).sum())
+    return measures | {"t_conn_ms": log.connected_s * MS, "t_hs_ms": log.handshake_s * MS}
 
 
 def summary(name: str, values: Floats) -> Measures:
@@ -401,8 +401,8 @@ def summary(name: str, values: Floats) -> Measures:
     names = [f"{name}_mean", *(f"{name}_p{p}" for p in PERCENTILES)]
     if not len(values):
         return dict.fromkeys(names, math.nan)
-    found = [values.mean(), *np.percentile(values, PERCENTILES)]
-    return {key: MS * float(value) for key, value in zip(names, found, strict=True)}
+    statistics = [values.mean(), *np.percentile(values, PERCENTILES)]
+    return {key: MS * float(value) for key, value in zip(names, statistics, strict=True)}
 
 
 def _within(times: Floats, start: float, end: float) -> NDArray[np.bool_]:

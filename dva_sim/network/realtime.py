@@ -91,15 +91,15 @@ class Poller:
     def poll(self, wait: float) -> list[Any]:
         """Return those that have something to read, after so long at most [s]; possibly none."""
         ready = {socket: None for socket in self._ask if has_more(socket)} if self._ask else {}
-        found: list[Any] = []
+        waiting: list[Any] = []
         for key, _ in self._selector.select(0.0 if ready else wait):
             source = key.data
             if source not in self._sockets:
-                found.append(source)
+                waiting.append(source)
             elif source not in ready and has_more(source):
                 ready[source] = None
         self._ask = ready
-        return [*ready, *found]
+        return [*ready, *waiting]
 
     def close(self) -> None:
         """Wait for nothing more."""

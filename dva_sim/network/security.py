@@ -426,8 +426,8 @@ class Security:
         if (device, key) in self._unknown_keys or len(self._unknown_keys) >= UNKNOWN_KEYS_REPORTED:
             return
         self._unknown_keys.add((device, key))
-        shown = z85.encode(key).decode()[:8] if len(key) == 32 else ""
-        why = f"an unknown key ({shown}...) tried to connect from {address}"
+        key_text = z85.encode(key).decode()[:8] if len(key) == 32 else ""
+        why = f"an unknown key ({key_text}...) tried to connect from {address}"
         if len(self._unknown_keys) == UNKNOWN_KEYS_REPORTED:
             why += "; there are many, no more will be told"
         self._tell(Refusal(device, None, "", Reason.UNKNOWN_KEY, why))

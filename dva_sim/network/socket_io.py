@@ -84,7 +84,7 @@ class PublisherSocket:
     def wanted(self, topic: str) -> bool:
         """Return True if a topic has a subscriber."""
         self.hear()
-        return any(topic.startswith(known) for known in self._topics)
+        return any(topic.startswith(subscribed) for subscribed in self._topics)
 
     def hear(self) -> None:
         """Note subscriptions: XPUB reports the first and the last subscriber of a topic."""

@@ -530,12 +530,12 @@ class SocketNetwork(RealNetwork):
         before = set(ring.devices)
         changed = ring.refresh()
         for peer in sorted(changed):
-            known = self._has_key(peer)
+            has_key = self._has_key(peer)
             came = "has changed" if peer in before else "is new"
-            self._tell(f"the key of {peer} {came if known else 'has gone: it is not heard now'}")
+            self._tell(f"the key of {peer} {came if has_key else 'has gone: it is not heard now'}")
             for socket, node in self._clients.get(peer, {}).items():
                 cut(socket)
-                if known:
+                if has_key:
                     self._security.aim(socket, node, peer)
                     self._reach(socket, peer)
         for node in self._publishers if changed & before else ():

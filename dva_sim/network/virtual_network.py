@@ -137,15 +137,15 @@ class VirtualNetwork:
 
     def _subscribers(self, node: str, topic: str) -> list[VirtualSubscription]:
         """Return the subscribers of a topic, connected or not; computed again after any change."""
-        known = self._wanted.get((node, topic))
-        if known is None:
-            known = [
+        subscribers = self._wanted.get((node, topic))
+        if subscribers is None:
+            subscribers = [
                 client
                 for client in self._clients[node]
                 if isinstance(client, VirtualSubscription) and topic.startswith(client.topic)
             ]
-            self._wanted[node, topic] = known
-        return known
+            self._wanted[node, topic] = subscribers
+        return subscribers
 
 
 class VirtualClient:
@@ -222,8 +222,8 @@ class VirtualWire(VirtualClient):
         super().drop()
         self._is_open = False
         if isinstance(self.connection, ZmtpConnection):
-            kept = [payload for payload, _ in self.connection.opener.pipe]
-            self._waiting.extendleft(reversed(kept))
+            payloads = [payload for payload, _ in self.connection.opener.pipe]
+            self._waiting.extendleft(reversed(payloads))
 
     def _opened(self) -> None:
         self._is_open = True

@@ -105,13 +105,13 @@ def forms_of(options: Callable[..., Any]) -> dict[str, tuple[Any, OptionForm]]:
         LookupError: one has no form.
     """
     hints = get_type_hints(options, include_extras=True)
-    found = {}
+    forms = {}
     for field in fields(cast(Any, options)):
         of, form = split(hints[field.name])
         if form is None:
             raise LookupError(f"option {field.name!r} has no form")
-        found[field.name] = of, form
-    return found
+        forms[field.name] = of, form
+    return forms
 
 
 def split(hint: Any) -> tuple[Any, OptionForm | None]:
@@ -123,8 +123,8 @@ def split(hint: Any) -> tuple[Any, OptionForm | None]:
 def signature_of(options: Callable[..., Any], returns: object) -> Signature:
     """Return the signature of a function that takes a class's options, each by its name."""
     forms = forms_of(options)
-    asked = signature(options).parameters.values()
-    plain = [each.replace(annotation=forms[each.name][0]) for each in asked]
+    parameters = signature(options).parameters.values()
+    plain = [each.replace(annotation=forms[each.name][0]) for each in parameters]
     return Signature(plain, return_annotation=returns)
 
 

@@ -168,10 +168,10 @@ def read_canonical(data: bytes) -> m.Message | None:
     if reader is None:
         return None
     match, read_body = reader
-    found = match(data)
-    if found is None:
+    fields = match(data)
+    if fields is None:
         return None
-    destination, number, source, clock, *rest = found.groups()
+    destination, number, source, clock, *rest = fields.groups()
     message_id = int(number)
     # Only a heartbeat has no session.
     session = int(rest[0]) if rest else None

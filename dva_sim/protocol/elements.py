@@ -42,13 +42,13 @@ def bad(reason: str) -> ProtocolError:
 
 def writer(element: str, kind: str) -> Write:
     """Return what writes a value of a simple type as the text of an element of that name."""
-    known = limits.facets(kind)
-    base = known["base"][0]
-    if "enumeration" in known:
-        words = known["enumeration"]
+    limits_of_kind = limits.facets(kind)
+    base = limits_of_kind["base"][0]
+    if "enumeration" in limits_of_kind:
+        words = limits_of_kind["enumeration"]
         return _text(element, "|".join(words), " or ".join(words))
     if base == "xs:string":
-        if "maxLength" not in known:
+        if "maxLength" not in limits_of_kind:
             return _text(element, limits.pattern(kind), _FORMS[kind])
         least, most = limits.length(kind)
         form = f"{least} to {most} {_FORMS[kind]}" if least else f"up to {most} {_FORMS[kind]}"
@@ -124,7 +124,7 @@ class Form:
         self._absent: dict[str, Any] = {}
         self._leaves: list[tuple[str, Write]] = []  # paths of attributes, and how each is written
         self._text = ""
-        given = signature(kind).parameters
+        parameters = signature(kind).parameters
         for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
             tag = node.get("name", "")
             least, most = limits.occurs(node)
@@ -135,7 +135,7 @@ class Form:
                 self._add("%s", [(name, _several(tag, inner.write, least, most))])
                 self._absent[name] = ()
             elif not least:
-                usual = given[name].default
+                usual = parameters[name].default
                 self._absent[name] = None if usual is Parameter.empty else usual
                 self._add("%s", [(name, _optional(tag, inner.write, self._absent[name]))])
             elif isinstance(inner, Form):
@@ -164,12 +164,12 @@ class Form:
 
     def read(self, element: _Element) -> Any:
         """Return the message of a validated element."""
-        found = dict(self._absent)
+        values = dict(self._absent)
         for child in element:
             name, read, is_list = self._fields[child.tag]
             value = read(child)
-            found[name] = (*found.get(name, ()), value) if is_list else value
-        return self._kind(**found)
+            values[name] = (*values.get(name, ()), value) if is_list else value
+        return self._kind(**values)
 
 
 def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
@@ -251,8 +251,10 @@ _WRITERS: Final[dict[type, tuple[str, Write]]] = {
 
 
 def _write_reply(body: m.Reply) -> str:
-    given = body.content
-    content = "" if given is None else _CONTENTS[type(given).__name__].write(given)
+    content_body = body.content
+    content = (
+        "" if content_body is None else _CONTENTS[type(content_body).__name__].write(content_body)
+    )
     return (
         f"<reply><Answers>{_ANSWERS(body.answers)}</Answers><Code>{_CODE(body.code)}</Code>"
         f"<Text>{_TEXT(body.text)}</Text>{content}</reply>"

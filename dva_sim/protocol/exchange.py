@@ -15,7 +15,7 @@ LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
 A_DAY = 345_600  # sessions: the DVA hands out at most four a second
 
 
-def is_absurd(session: int, known: int) -> bool:
+def is_absurd(session: int, highest: int) -> bool:
     """Return True for a session number that no honest DVA can have reached by now.
 
     It is more than a day ahead of the highest that is known, or leaves no room for another day.
@@ -23,7 +23,7 @@ def is_absurd(session: int, known: int) -> bool:
     """
     count = session >> LOW_BITS
     newest = (1 << LOW_BITS) - 1
-    return count > newest - A_DAY or (bool(known) and count > (known >> LOW_BITS) + A_DAY)
+    return count > newest - A_DAY or (bool(highest) and count > (highest >> LOW_BITS) + A_DAY)
 
 
 class Outbox:
@@ -103,17 +103,17 @@ class ReplyCache:
 
     def put(self, key: Key, source: str, reply: bytes) -> bytes:
         """Remember a reply to a request of `source`, and return it."""
-        kept = self._kept.get(source)
-        if kept is None:
-            kept = self._kept[source] = _Kept()
+        replies = self._kept.get(source)
+        if replies is None:
+            replies = self._kept[source] = _Kept()
         self._kept.move_to_end(source)
-        keys = kept.keys
-        used = kept.used + len(reply)
+        keys = replies.keys
+        used = replies.used + len(reply)
         keys.append(key)
         self._replies[key] = reply
         while len(keys) > self._each or (used > self._room and len(keys) > 1):
             used -= len(self._replies.pop(keys.popleft(), b""))
-        kept.used = used
+        replies.used = used
         if len(self._kept) > self._sources:
             for key in self._kept.popitem(last=False)[1].keys:
                 self._replies.pop(key, None)

@@ -27,8 +27,8 @@ def schema_file() -> Path:
 
     One in the working folder must not replace it.
     """
-    found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
-    return next(path for path in found if path.is_file())
+    files = (root / "protocol" / "dva.xsd" for root in roots()[1:])
+    return next(path for path in files if path.is_file())
 
 
 @cache
@@ -40,13 +40,13 @@ def tree() -> etree._ElementTree:
 @cache
 def facets(name: str) -> dict[str, list[str]]:
     """Return what restricts a simple type, the narrowest first, and `base`, its origin."""
-    found: dict[str, list[str]] = {}
+    limits: dict[str, list[str]] = {}
     while (restriction := _restrictions().get(name)) is not None:
         for facet in restriction.iterchildren(f"{_XS}*"):
-            found.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
+            limits.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
         name = str(restriction.get("base"))
-        found["base"] = [name]
-    return found
+        limits["base"] = [name]
+    return limits
 
 
 @cache
@@ -78,17 +78,17 @@ def pattern(name: str) -> str:
 
 def length(name: str) -> tuple[int, int]:
     """Return the least and the greatest length of a type's text [characters]."""
-    known = facets(name)
-    return int(known.get("minLength", ["0"])[0]), int(known["maxLength"][0])
+    limits = facets(name)
+    return int(limits.get("minLength", ["0"])[0]), int(limits["maxLength"][0])
 
 
 def bounds(name: str) -> tuple[float, float]:
     """Return the least and the greatest of a type's numbers; of whole numbers they are whole."""
-    known = facets(name)
+    limits = facets(name)
     kind = int if facets(name)["base"][0] in WHOLE else float
-    low = known.get("minInclusive", ["0"])[0]
-    high = known.get("maxInclusive")
-    return kind(low), kind(high[0]) if high else WHOLE[known["base"][0]]
+    low = limits.get("minInclusive", ["0"])[0]
+    high = limits.get("maxInclusive")
+    return kind(low), kind(high[0]) if high else WHOLE[limits["base"][0]]
 
 
 def children(element: etree._Element) -> list[etree._Element]:
@@ -105,8 +105,8 @@ def parts(name: str) -> list[etree._Element]:
 
 
 def _below(node: etree._Element) -> Iterator[etree._Element]:
-    known = node.get("type") or node.get("ref")
-    for child in node if known is None else [_named()[known]]:
+    type_name = node.get("type") or node.get("ref")
+    for child in node if type_name is None else [_named()[type_name]]:
         if child.tag == f"{_XS}element":
             yield child
         elif isinstance(child.tag, str):
@@ -116,8 +116,8 @@ def _below(node: etree._Element) -> Iterator[etree._Element]:
 @cache
 def _named() -> dict[str, etree._Element]:
     """Return types that hold elements, and groups."""
-    found = tree().getroot().iterchildren(f"{_XS}complexType", f"{_XS}group")
-    return {str(node.get("name")): node for node in found}
+    nodes = tree().getroot().iterchildren(f"{_XS}complexType", f"{_XS}group")
+    return {str(node.get("name")): node for node in nodes}
 
 
 def is_simple(element: etree._Element) -> bool:

@@ -26,26 +26,30 @@ def form_of(element: str) -> str | None:
     types = types_of(element)
     if len(types) != 1:
         return None
-    found = facets(str(types.pop()))
-    return _in_words(found) if found else None
+    limits = facets(str(types.pop()))
+    return _in_words(limits) if limits else None
 
 
-def _in_words(known: dict[str, list[str]]) -> str:
-    if "enumeration" in known:
-        *others, last = known["enumeration"]
+def _in_words(limits_of_type: dict[str, list[str]]) -> str:
+    if "enumeration" in limits_of_type:
+        *others, last = limits_of_type["enumeration"]
         return f"one of {', '.join(others)} or {last}" if others else last
-    base = known["base"][0]
-    if base in WHOLE or "minInclusive" in known:
-        low = known.get("minInclusive", ["0"])[0]
-        high = known.get("maxInclusive", [WHOLE.get(base, "any")])[0]
+    base = limits_of_type["base"][0]
+    if base in WHOLE or "minInclusive" in limits_of_type:
+        low = limits_of_type.get("minInclusive", ["0"])[0]
+        high = limits_of_type.get("maxInclusive", [WHOLE.get(base, "any")])[0]
         kind = "a whole number" if base in WHOLE else "a number"
         return f"{kind} from {low} to {high}, in the digits 0 to 9"
-    if "maxLength" in known:
-        shortest = known.get("minLength", ["0"])[0]
-        longest = known["maxLength"][0]
+    if "maxLength" in limits_of_type:
+        shortest = limits_of_type.get("minLength", ["0"])[0]
+        longest = limits_of_type["maxLength"][0]
         length = f"{shortest} to {longest} characters"
-        return f"{length} of the form {known['pattern'][0]}" if "pattern" in known else length
-    return "of the form " + " and ".join(known["pattern"])
+        return (
+            f"{length} of the form {limits_of_type['pattern'][0]}"
+            if "pattern" in limits_of_type
+            else length
+        )
+    return "of the form " + " and ".join(limits_of_type["pattern"])
 
 
 READ_BYTES: Final = MAX_BYTES + 1
@@ -84,8 +88,8 @@ def check_message(data: bytes) -> list[Problem]:
     try:
         decode(data)
     except ProtocolError as error:
-        found = _by_sight(data) or _by_grammar(data) or _by_schema(data)
-        return sorted(set(found)) or [Problem(1, 1, f"{error.reason}; see protocol/README.md")]
+        problems = _by_sight(data) or _by_grammar(data) or _by_schema(data)
+        return sorted(set(problems)) or [Problem(1, 1, f"{error.reason}; see protocol/README.md")]
     return []
 
 
@@ -98,8 +102,8 @@ def _by_sight(data: bytes) -> list[Problem]:
     if data.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
         return [Problem(1, 1, "begins with a byte order mark; should be UTF-8 without one")]
     broken, end = _declaration(data)
-    found = broken or not_text(data) or _before_the_root(data, end)
-    return [found] if found else list(_other_markup(data, end))
+    problem = broken or not_text(data) or _before_the_root(data, end)
+    return [problem] if problem else list(_other_markup(data, end))
 
 
 def _declaration(data: bytes) -> tuple[Problem | None, int]:
@@ -154,20 +158,20 @@ def _by_schema(data: bytes) -> list[Problem]:
     schema = _schema()
     schema.validate(tree)
     places = dict(zip(tree.iter("*"), _walk(data)[0], strict=True))
-    found: dict[int, Problem] = {}
+    problems: dict[int, Problem] = {}
     log: Any = schema.error_log  # known to be iterable by lxml, not by its stubs
     for entry in list(log):
         element = _element_at(tree, entry.path)
         place = places[element]
         stray = place.text if "haracter content" in entry.message else None
         offset = place.start if stray is None else stray
-        found.setdefault(offset, at(data, offset, _explain(element, entry)))
-    return list(found.values())
+        problems.setdefault(offset, at(data, offset, _explain(element, entry)))
+    return list(problems.values())
 
 
 def _element_at(tree: etree._ElementTree, path: str | None) -> etree._Element:
-    found: Any = tree.xpath(path) if path else None
-    element: etree._Element = found[0] if found else tree.getroot()
+    elements: Any = tree.xpath(path) if path else None
+    element: etree._Element = elements[0] if elements else tree.getroot()
     return element
 
 
@@ -266,8 +270,8 @@ def not_text(data: bytes) -> Problem | None:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         if zero < 0 or error.start < zero:
-            found = f"byte 0x{data[error.start]:02X} is not text in UTF-8"
-            return at(data, error.start, f"{found}; the file should be in UTF-8")
+            mistake = f"byte 0x{data[error.start]:02X} is not text in UTF-8"
+            return at(data, error.start, f"{mistake}; the file should be in UTF-8")
     return (
         at(data, zero, "a zero byte is not text; the file should be in UTF-8")
         if zero >= 0

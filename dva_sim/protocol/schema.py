@@ -60,13 +60,13 @@ def _refuse_by_sight(data: bytes) -> None:
     rest = data[_end_of_declaration(data) :]
     if 0 in rest or not rest.lstrip().startswith(b"<"):
         raise ProtocolError(BAD_MESSAGE, "not XML in UTF-8 without byte order mark")
-    found = _TAG.findall(rest)
-    if len(found) != rest.count(b"<"):
+    tags = _TAG.findall(rest)
+    if len(tags) != rest.count(b"<"):
         raise ProtocolError(
             BAD_MESSAGE, "markup other than plain elements, which have no attribute or namespace"
         )
-    if not _names().issuperset(found):
-        unknown = next(name for name in found if name not in _names())
+    if not _names().issuperset(tags):
+        unknown = next(name for name in tags if name not in _names())
         raise ProtocolError(BAD_MESSAGE, f"no element is called {unknown.decode()[:64]}")
     if _OTHER_ENTITY.search(rest):
         raise ProtocolError(BAD_MESSAGE, "& that begins no &amp;, &lt;, &gt; or the like")

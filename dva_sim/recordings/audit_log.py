@@ -127,12 +127,12 @@ class AuditLog:
         self.head = NOTHING_BEFORE
         is_new = not path.exists() or _holds_nothing(path)
         if not is_new:
-            found = verify(self.path)
-            if found.problem is not None:
-                text = f"row {found.problem.number} {found.problem.text}"
+            verified = verify(self.path)
+            if verified.problem is not None:
+                text = f"row {verified.problem.number} {verified.problem.text}"
                 raise ConfigError(f"is not an audit log that can be appended to: {text}", self.path)
-            self.number = found.rows
-            self.head = found.head
+            self.number = verified.rows
+            self.head = verified.head
         try:
             self._file = sqlite3.connect(
                 path, isolation_level=None, timeout=OPEN_WITHIN, check_same_thread=False
@@ -166,9 +166,9 @@ class AuditLog:
 
     def _rows(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
         last = self._file.execute(_LAST).fetchone()
-        known, before = last or (0, NOTHING_BEFORE)
+        last_number, before = last or (0, NOTHING_BEFORE)
         rows = list[AuditRow]()
-        for number, entry in enumerate(entries, known + 1):
+        for number, entry in enumerate(entries, last_number + 1):
             rows.append(row_of(entry, number, before))
             before = rows[-1].hash
         return rows
@@ -249,10 +249,10 @@ def read_rows(path: Path, after: int = 0, most: int = -1) -> list[AuditRow]:
     """
     with closing(_opened(path)) as file:
         try:
-            found = file.execute(
+            rows = file.execute(
                 f"{_SELECT} WHERE number > ? ORDER BY number LIMIT ?", (after, most)
             )
-            return [_row(values) for values in found]
+            return [_row(values) for values in rows]
         except (sqlite3.Error, ValueError, TypeError) as error:
             raise ConfigError(f"cannot be read as an audit log: {error}", path) from None
 
@@ -271,8 +271,8 @@ def verify(path: Path) -> Verified:
 
 
 def _followed(file: sqlite3.Connection) -> Verified:
-    kept = dict(file.execute("SELECT name, value FROM about"))
-    if kept.get("format") != str(FORMAT):
+    about = dict(file.execute("SELECT name, value FROM about"))
+    if about.get("format") != str(FORMAT):
         return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log of format {FORMAT}"))
     number = 0
     head = NOTHING_BEFORE

@@ -299,9 +299,9 @@ def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str,
 def body(time: float, name: str, radius: float = PERSON) -> ChannelMessage:
     """Return somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
     kind = name.rpartition("-")[0]
-    known = kind if kind in TALL else "robot"
-    tall = TALL[known]
-    paint = messages.colour(BODIES[known])
+    drawn_as = kind if kind in TALL else "robot"
+    tall = TALL[drawn_as]
+    paint = messages.colour(BODIES[drawn_as])
     arrow = {
         "pose": messages.pose(0.0, 0.0, z=tall),
         "shaft_length": radius,

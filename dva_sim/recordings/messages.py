@@ -112,7 +112,7 @@ _WORDS: dict[str, Schema] = {
 """Types of fields by the word that stands for them; the types made of them come on top."""
 
 
-def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
+def _read(text: str, type_by_name: dict[str, Schema]) -> dict[str, Schema]:
     """Return the types of a text by full names, and by their last words where known."""
     types: dict[str, Schema] = {}
     for paragraph in text.strip().split("\n\n"):
@@ -121,8 +121,8 @@ def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
         fields: dict[str, Schema] = {}
         for group in body.split(";"):
             names, _, kind = group.partition(":")
-            fields |= dict.fromkeys(names.split(), _type(kind.strip(), known))
-        types[title] = known[title.rpartition(".")[2]] = {
+            fields |= dict.fromkeys(names.split(), _type(kind.strip(), type_by_name))
+        types[title] = type_by_name[title.rpartition(".")[2]] = {
             "title": title,
             "description": version,
             "type": "object",
@@ -132,13 +132,13 @@ def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
     return types
 
 
-def _type(kind: str, known: Mapping[str, Schema]) -> Schema:
+def _type(kind: str, type_by_name: Mapping[str, Schema]) -> Schema:
     if "=" in kind:
         values = [value.split("=") for value in kind.split()]
         return {"oneOf": [{"title": name, "const": int(number)} for name, number in values]}
     if kind.endswith("*"):
-        return {"type": "array", "items": known[kind[:-1]]}
-    return known[kind]
+        return {"type": "array", "items": type_by_name[kind[:-1]]}
+    return type_by_name[kind]
 
 
 def _schemas() -> dict[str, Schema]:
@@ -149,9 +149,9 @@ def _schemas() -> dict[str, Schema]:
     named values. A type is known by its last word to those after it.
     """
     parts, _, whole = Path(__file__).with_name("schemas.txt").read_text().partition("----")
-    known = dict(_WORDS)
-    _read(parts, known)
-    return _read(whole, known)
+    type_by_name = dict(_WORDS)
+    _read(parts, type_by_name)
+    return _read(whole, type_by_name)
 
 
 SCHEMAS = _schemas()

@@ -397,8 +397,8 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
         for entry in run["drives"]
     ]
     for topic, contents in raw.contents.items():
-        for time, shown in contents if topic.endswith(f"/{channels.SCREEN}") else ():
-            drives[shown["drive"]].frames.append(Shown(shown["captured_s"], time, 0))
+        for time, content in contents if topic.endswith(f"/{channels.SCREEN}") else ():
+            drives[content["drive"]].frames.append(Shown(content["captured_s"], time, 0))
         for time, made in contents if topic.endswith(f"/{channels.COMMANDS}") else ():
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)

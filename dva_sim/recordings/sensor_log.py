@@ -74,15 +74,15 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> SensorLog:
     columns = _columns_of(rows[0][1], path)
     if not columns.names:
         rows.insert(0, (0, []))
-    found = [(number, _numbers(row, columns, path, number)) for number, row in rows[1:]]
-    times = [numbers[0] for _, numbers in found]
-    axes = [numbers[1:] for _, numbers in found]
+    numbered = [(number, _numbers(row, columns, path, number)) for number, row in rows[1:]]
+    times = [numbers[0] for _, numbers in numbered]
+    axes = [numbers[1:] for _, numbers in numbered]
     guesses = list[str]()
     second = _second_of(times, columns, path, guesses)
     metre = _metre_of(axes, columns, unit, path, guesses)
     _require_gravity(axes, metre, (times[-1] - times[0]) * second if times else 0.0, path)
     samples = list[MotionSample]()
-    for number, (time, x, y, z) in found:
+    for number, (time, x, y, z) in numbered:
         times_s = (time - times[0]) * second
         if samples and times_s < samples[-1].stamp:
             raise ConfigError("time goes backwards here", path, number, 1)

@@ -125,13 +125,13 @@ class RosbridgeClient:
         self.is_connected = True
         for topic, kind in self._advertised.items():
             self._send({"op": "advertise", "topic": topic, "type": kind})
-        for topic, wanted in self._topics.items():
+        for topic, subscription in self._topics.items():
             self._send(
                 {
                     "op": "subscribe",
                     "topic": topic,
-                    "type": wanted.type,
-                    "throttle_rate": wanted.throttle_ms,
+                    "type": subscription.type,
+                    "throttle_rate": subscription.throttle_ms,
                     "queue_length": 1,  # of old readings none is of use
                 }
             )
@@ -158,11 +158,11 @@ class RosbridgeClient:
 
     def _take(self, data: bytes) -> None:
         topic = self._topic_of(data)
-        wanted = self._topics.get(topic)
-        if wanted is not None and len(data) > wanted.largest:
-            self._refuse(topic, f"{len(data)} bytes; at most {wanted.largest} are read")
+        subscription = self._topics.get(topic)
+        if subscription is not None and len(data) > subscription.largest:
+            self._refuse(topic, f"{len(data)} bytes; at most {subscription.largest} are read")
             return
-        if wanted is None and len(data) > MOST_QUEUED:
+        if subscription is None and len(data) > MOST_QUEUED:
             self._refuse("", f"{len(data)} bytes of a topic that was not asked for")
             return
         try:
@@ -171,9 +171,9 @@ class RosbridgeClient:
             self._refuse(topic, str(error))
             return
         if operation["op"] == "publish":
-            wanted = self._topics.get(str(operation.get("topic")))
-            if wanted is not None:
-                wanted.take(operation.get("msg"))
+            subscription = self._topics.get(str(operation.get("topic")))
+            if subscription is not None:
+                subscription.take(operation.get("msg"))
         elif operation["op"] == "service_response":
             self._answered(operation)
         elif operation["op"] == "status" and operation.get("level") in ("error", "warning"):

@@ -258,11 +258,11 @@ class RosGateway:
     def _listed(self, reply: m.Reply) -> None:
         if not isinstance(reply.content, m.DeviceList):
             return
-        known = {robot.id_tag for robot in self.robots.values()}
+        id_tags = {robot.id_tag for robot in self.robots.values()}
         for device in reply.content.devices:
             if device.device_type != ROBOT or len(self.robots) >= MOST_ROBOTS:
                 continue
-            if device.id_tag in known:
+            if device.id_tag in id_tags:
                 self.device.introduce(device.id_tag, device.address)
             else:
                 name = namespace_of(device.label)

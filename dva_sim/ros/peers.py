@@ -139,12 +139,12 @@ class RosPeer:
 
     def _subscribe(self, operation: Json) -> None:
         topic = name_in(operation, "topic")
-        known = self._host.type_of(topic)
-        if known is None:
+        type_name = self._host.type_of(topic)
+        if type_name is None:
             raise BadOperation(f"topic {topic!r} is not served; see /rosapi/topics")
         kind = operation.get("type")
-        if kind is not None and plain_type(name_in(operation, "type")) != known:
-            raise BadOperation(f"topic {topic!r} is of type {known}, not {kind}")
+        if kind is not None and plain_type(name_in(operation, "type")) != type_name:
+            raise BadOperation(f"topic {topic!r} is of type {type_name}, not {kind}")
         if operation.get("compression", "none") not in ("none", None):
             self.say("compression is not supported: messages come as JSON")
         number_in(operation, "queue_length", 1e9)
@@ -190,12 +190,12 @@ class RosPeer:
 
     def offer(self, topic: str, data: bytes) -> None:
         """Send a reading, unless it wants it later or has not taken the last ones."""
-        wanted = self.wants.get(topic)
+        subscription = self.wants.get(topic)
         now = self._host.now()
-        if wanted is None or now < wanted.sent_at + wanted.period - 1e-6:
+        if subscription is None or now < subscription.sent_at + subscription.period - 1e-6:
             return
         if self._connection.waiting <= MOST_BEHIND:
-            wanted.sent_at = now
+            subscription.sent_at = now
             self._connection.send(data)
 
     def say(self, what: str) -> None:

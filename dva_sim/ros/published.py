@@ -107,8 +107,8 @@ def occupancy(grid: OccupancyGrid) -> Json:
     padded = np.full((rows * step, columns * step), UNKNOWN, cells.dtype)
     padded[: cells.shape[0], : cells.shape[1]] = cells
     blocks = padded.reshape(rows, step, columns, step)
-    known = np.where((blocks == UNKNOWN).all(axis=(1, 3)), -1, 0)
-    values = np.where((blocks == OCCUPIED).any(axis=(1, 3)), 100, known)
+    is_known = np.where((blocks == UNKNOWN).all(axis=(1, 3)), -1, 0)
+    values = np.where((blocks == OCCUPIED).any(axis=(1, 3)), 100, is_known)
     x, y, heading = grid.origin
     return {
         "header": _header(0.0, MAP),

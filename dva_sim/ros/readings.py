@@ -72,8 +72,8 @@ def part(message: Any, *path: str) -> Any:
 
 
 def _shown(value: Any) -> str:
-    shown = repr(value)
-    return shown if len(shown) <= 40 else f"{shown[:37]}..."
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def stamp_of(message: Any) -> float | None:
@@ -213,9 +213,9 @@ class RosReader:
         return tuple(round(value, 3) for value in nearest)
 
     def _check_frame(self, where: str, frame: Any, kind: str) -> None:
-        wanted = getattr(self._profile.frames, kind)
-        if not isinstance(frame, str) or _bare(frame) != _bare(wanted):
-            raise BadReading(f"{where} is {_shown(frame)}, not {wanted!r}: see frames.{kind}")
+        expected = getattr(self._profile.frames, kind)
+        if not isinstance(frame, str) or _bare(frame) != _bare(expected):
+            raise BadReading(f"{where} is {_shown(frame)}, not {expected!r}: see frames.{kind}")
 
     def _placed(self, pose: Any, place: str, rotation: str) -> tuple[float, float, float]:
         scale = self._profile.units.metres

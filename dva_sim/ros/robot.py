@@ -148,7 +148,7 @@ class RosRobot:
         kind = profile.type_name
         sensor = partial(kind, "sensor_msgs")
         picture = 4 * profile.largest_picture_bytes // 3 + 1000  # as base64
-        wanted = {
+        subscriptions = {
             topics.battery: Subscribed(sensor("BatteryState"), self._on_battery, SMALL),
             topics.picture: Subscribed(
                 sensor("CompressedImage"), self._on_picture, picture, PICTURES_MS
@@ -159,10 +159,12 @@ class RosRobot:
         }
         if topics.odometry is not None:
             kind_of = kind("nav_msgs", "Odometry")
-            wanted[topics.odometry] = Subscribed(kind_of, self._on_odometry, SMALL, ODOMETRY_MS)
+            subscriptions[topics.odometry] = Subscribed(
+                kind_of, self._on_odometry, SMALL, ODOMETRY_MS
+            )
         else:
-            wanted[topics.tf] = Subscribed(kind("tf2_msgs", "TFMessage"), self._on_tf, SMALL)
-        return {name(topic): each for topic, each in wanted.items() if topic is not None}
+            subscriptions[topics.tf] = Subscribed(kind("tf2_msgs", "TFMessage"), self._on_tf, SMALL)
+        return {name(topic): each for topic, each in subscriptions.items() if topic is not None}
 
     def begin(self) -> None:
         """Connect to the bridge; the robot registers once its odometry is as it should be."""
@@ -179,7 +181,7 @@ class RosRobot:
         self._move(self._reader.odometry, message)
 
     def _on_tf(self, message: Any) -> None:
-        self._move(lambda found: self._reader.transform(found, self._motion), message)
+        self._move(lambda transforms: self._reader.transform(transforms, self._motion), message)
 
     def _move(self, read: Callable[[Any], RosMotion | None], message: Any) -> None:
         try:

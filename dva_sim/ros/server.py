@@ -237,15 +237,15 @@ class RosbridgeServer:
 
     def changed(self) -> None:
         """See `PeerHost`: hear of each robot what somebody wants, and no more."""
-        wanted = {
+        topics = {
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }
         for name in self._gateway.robots:
             self._gateway.listen(
                 name,
-                frames=bool(wanted & {f"/{name}/odom", "/tf"}),
-                scan=f"/{name}/scan" in wanted,
-                pictures=f"/{name}/image/compressed" in wanted,
+                frames=bool(topics & {f"/{name}/odom", "/tf"}),
+                scan=f"/{name}/scan" in topics,
+                pictures=f"/{name}/image/compressed" in topics,
             )
 
     def _tick(self) -> None:

@@ -100,14 +100,14 @@ def own_names(
         any_port: See `OwnNames`.
         programs: See `OwnNames`.
     """
-    known = {name.lower().strip("[]") for name in (*names, host)}
+    names_here = {name.lower().strip("[]") for name in (*names, host)}
     everywhere = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_unspecified
     local = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_loopback
     if everywhere or local or host.lower() == "localhost":
-        known.update(LOCAL)
+        names_here.update(LOCAL)
     if everywhere:
-        known.add(socket.gethostname().lower())
-    return OwnNames(frozenset(known), everywhere, any_port, programs)
+        names_here.add(socket.gethostname().lower())
+    return OwnNames(frozenset(names_here), everywhere, any_port, programs)
 
 
 @dataclass(frozen=True)
@@ -138,19 +138,19 @@ class Admission:
         except ValueError:  # more fields than anybody writes
             return 400, "the address makes no sense"
         token = token or bearer.removeprefix("Bearer ")
-        shown = token.encode("utf-8", "replace")
+        token_bytes = token.encode("utf-8", "replace")
         secret = self.token.encode()
-        if self.token and not hmac.compare_digest(shown, secret):
+        if self.token and not hmac.compare_digest(token_bytes, secret):
             return 401, "the token is missing or wrong: add ?token=... as printed with the address"
         return None
 
 
 def name_in(host: str) -> str | None:
     """Return the name or address in a `Host` header, in lower case; None if it is none."""
-    found = _HOST.fullmatch(host)
-    if found is None:
+    match = _HOST.fullmatch(host)
+    if match is None:
         return None
-    return (found["six"] or found["name"]).lower()
+    return (match["six"] or match["name"]).lower()
 
 
 def is_address(name: str) -> bool:

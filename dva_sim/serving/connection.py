@@ -33,8 +33,8 @@ class HttpProtocol(H11Protocol):
         is_made: True once the connection belongs to the protocol, and no longer to the listener.
     """
 
-    def __init__(self, place: PortConnection, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, place: PortConnection, **options: Any) -> None:
+        super().__init__(**options)
         self._place = place
         self.is_made = False
         self._is_lost = False

@@ -25,8 +25,8 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
         ConfigError: the address is not of this machine, or taken.
     """
     try:
-        found = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
-        family, kind, protocol, _, address = found[0]
+        addresses = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
+        family, kind, protocol, _, address = addresses[0]
         with contextlib.ExitStack() as on_failure:
             sock = on_failure.enter_context(socket.socket(family, kind, protocol))
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

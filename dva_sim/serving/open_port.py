@@ -55,9 +55,9 @@ class OpenPort:
     @property
     def url(self) -> str:
         """Return its address, with the token."""
-        shown = f"[{self.host}]" if ":" in self.host else self.host
+        host_text = f"[{self.host}]" if ":" in self.host else self.host
         query = f"/?token={self.token}" if self.token else ""
-        return f"ws://{shown}:{self.listener.getsockname()[1]}{query}"
+        return f"ws://{host_text}:{self.listener.getsockname()[1]}{query}"
 
 
 def open_port(host: str, port: int, option: str, has_token: bool = True) -> OpenPort:

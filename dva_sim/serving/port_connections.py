@@ -121,9 +121,9 @@ class PortConnections:
 
     def _least(self) -> PortConnection:
         """Return the connection that makes room first."""
-        known = [place for place in self.taken if place.rank > 0]
+        shaken = [place for place in self.taken if place.rank > 0]
         # Newcomers show their token in their first request, so some places are always theirs.
-        full = known if len(known) > self._most_served else ()
+        full = shaken if len(shaken) > self._most_served else ()
         return min(full or self.taken, key=_importance)
 
     def _drop(self, place: PortConnection, why: str) -> None:

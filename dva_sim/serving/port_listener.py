@@ -38,12 +38,12 @@ SHUTDOWN: Final = 1.0  # for the end of a TLS connection [s]
 def fitting_places(listeners: int) -> PortConnections:
     """Return the places of one of some ports: fewer where a process may open few files."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = listeners * MOST + SPARE_FILES
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        most = wanted if hard == resource.RLIM_INFINITY else min(hard, wanted)
+    needed = listeners * MOST + SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < needed:
+        most = needed if hard == resource.RLIM_INFINITY else min(hard, needed)
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
-        wanted = max(soft, most)
-    most = min(MOST, max(16, (wanted - SPARE_FILES) // listeners))
+        needed = max(soft, most)
+    most = min(MOST, max(16, (needed - SPARE_FILES) // listeners))
     return PortConnections(most, MOST_SERVED * most // MOST)
 
 

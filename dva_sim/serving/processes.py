@@ -65,13 +65,13 @@ class Child(subprocess.Popen[bytes]):
             ChildFailed: it ended, or there was nothing for `within` seconds.
         """
         deadline = time.monotonic() + within
-        while (found := look()) is None:
+        while (result := look()) is None:
             if self.poll() is not None:
                 raise ChildFailed(self.why())
             if time.monotonic() > deadline:
                 raise ChildFailed(f"{self.name} said nothing within {within:g} s")
             time.sleep(LOOK)
-        return found
+        return result
 
     def why(self) -> str:
         """Return in one line that it has ended, and why: its last words, or how it ended."""

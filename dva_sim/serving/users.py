@@ -61,9 +61,9 @@ def is_password_of(user: User | None, password: str) -> bool:
     from argon2 import PasswordHasher  # late: start-up
     from argon2.exceptions import InvalidHashError, VerificationError  # late: start-up
 
-    known = user.password if user is not None else _NOBODYS
+    password_hash = user.password if user is not None else _NOBODYS
     try:
-        PasswordHasher().verify(known, password[:MOST_LETTERS])
+        PasswordHasher().verify(password_hash, password[:MOST_LETTERS])
     except (VerificationError, InvalidHashError):
         return False
     return user is not None

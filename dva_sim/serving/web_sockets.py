@@ -25,8 +25,8 @@ class WireProtocol(WebSocketsSansIOProtocol):
         given: See `WebSocketsSansIOProtocol`.
     """
 
-    def __init__(self, place: PortConnection, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, place: PortConnection, **options: Any) -> None:
+        super().__init__(**options)
         self._place = place
         self.app = extended(self.app, {PLACE: place, WIRE: self})
 

@@ -103,8 +103,8 @@ def load_measure(name: str, base: Path | None = None) -> RunMeasure:
     Raises:
         ConfigError: there is none, it cannot be made, or does not say what it is.
     """
-    found = PLUGINS.located(name, base)
-    return _loaded(found)
+    plugin = PLUGINS.located(name, base)
+    return _loaded(plugin)
 
 
 @read_once(lambda name: [Path(file_in(name))])
@@ -115,8 +115,8 @@ def _loaded(name: str) -> RunMeasure:
     if not isinstance(about, Measure):
         raise ConfigError(f"measure {name!r} should say what it is: about = Measure(name, meaning)")
     if not _NAME.fullmatch(about.name):
-        wanted = "small letters, digits and _, as in wall_time_s"
-        raise ConfigError(f"measure {name!r} is called {about.name!r}; should be {wanted}")
+        form = "small letters, digits and _, as in wall_time_s"
+        raise ConfigError(f"measure {name!r} is called {about.name!r}; should be {form}")
     return made
 
 

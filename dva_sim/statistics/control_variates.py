@@ -38,11 +38,11 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
     values = np.array(means, dtype=float)
     beside = np.asarray(covariates, dtype=float)
     for level in range(values.shape[1]):
-        known = np.isfinite(values[:, level]) & np.isfinite(beside[:, :, level]).all(axis=0)
-        if len(beside) and known.sum() >= FEWEST_EACH * (1 + len(beside)):
-            found = _pseudo_values(values[known, level], beside[:, known, level].T)
+        is_finite = np.isfinite(values[:, level]) & np.isfinite(beside[:, :, level]).all(axis=0)
+        if len(beside) and is_finite.sum() >= FEWEST_EACH * (1 + len(beside)):
+            pseudo_values = _pseudo_values(values[is_finite, level], beside[:, is_finite, level].T)
             values[:, level] = np.nan
-            values[known, level] = found
+            values[is_finite, level] = pseudo_values
     return values
 
 

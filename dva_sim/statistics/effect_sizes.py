@@ -58,8 +58,8 @@ def effect_size(
     if n < _FEWEST:
         return EffectSize(_nothing(n), _nothing(n))
     sizes = _beside_differences, _beside_persons
-    found = _studentised(sizes, first, second, resamples)
-    paired, average = (_times(each, _hedges(n)) for each in found)
+    intervals = _studentised(sizes, first, second, resamples)
+    paired, average = (_times(each, _hedges(n)) for each in intervals)
     return EffectSize(paired, average)
 
 
@@ -82,8 +82,10 @@ def _size(pairs: Pairs, spread: Floats) -> Floats:
     return np.where(there, size * np.sqrt(np.maximum(pairs.persons - 1, 0) / pairs.persons), np.nan)
 
 
-def _times(found: Interval, factor: float) -> Interval:
-    return Interval(found.mean * factor, found.low * factor, found.high * factor, found.n_persons)
+def _times(interval: Interval, factor: float) -> Interval:
+    return Interval(
+        interval.mean * factor, interval.low * factor, interval.high * factor, interval.n_persons
+    )
 
 
 def _hedges(n: int) -> float:
@@ -141,8 +143,8 @@ def variance_reduction(
     if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
         return VarianceReduction(_nothing(n), _nothing(n))
     scaled = _on_fishers_scale(_correlation), _on_fishers_scale(_shared)
-    found = _studentised(scaled, first, second, resamples)
-    correlation, shared = (_back(each) for each in found)
+    intervals = _studentised(scaled, first, second, resamples)
+    correlation, shared = (_back(each) for each in intervals)
     ratio = Interval(1 - shared.mean, 1 - shared.high, 1 - shared.low, n)
     return VarianceReduction(correlation, ratio)
 
@@ -157,9 +159,9 @@ def _on_fishers_scale(statistic: Statistic) -> Statistic:
     return unbounded
 
 
-def _back(found: Interval) -> Interval:
-    low, mean, high = np.tanh([found.low, found.mean, found.high]).tolist()
-    return Interval(mean, low, high, found.n_persons)
+def _back(interval: Interval) -> Interval:
+    low, mean, high = np.tanh([interval.low, interval.mean, interval.high]).tolist()
+    return Interval(mean, low, high, interval.n_persons)
 
 
 def _correlation(pairs: Pairs) -> Floats:

@@ -52,8 +52,8 @@ class Incidence:
         place = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
         if not self.events:
             return np.full(place.shape, np.nan)
-        found: Floats = np.r_[0.0, self.shares[cause - 1]][place]
-        return found
+        share: Floats = np.r_[0.0, self.shares[cause - 1]][place]
+        return share
 
     def restricted_mean(self, limit: float, cause: int = 1) -> float:
         """Return the mean of the smaller of `limit` [s] and the time to a cause.
@@ -167,8 +167,8 @@ def cumulative_incidence(
     left_out = [owner != one for one in range(len(persons))]
     shares = np.transpose(
         [
-            _shares(moments[kept], causes_met[kept], len(names), horizon)
-            for kept in (np.ones(len(owner), dtype=bool), *left_out)
+            _shares(moments[chosen], causes_met[chosen], len(names), horizon)
+            for chosen in (np.ones(len(owner), dtype=bool), *left_out)
         ]
     )
     intervals = [_interval(share, len(persons), len(owner)) for share in shares]

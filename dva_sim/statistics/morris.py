@@ -59,9 +59,9 @@ def elementary_effects(walks: Floats, outcome: NDArray[np.float64]) -> list[Elem
     changes = np.diff(walks, axis=1)
     axis_of_step = abs(changes).argmax(axis=2)
     signs = np.sign(np.take_along_axis(changes, axis_of_step[..., None], axis=2)[..., 0])
-    found = signs * np.diff(outcome, axis=1) / STEP
-    effects = np.empty_like(found)
-    np.put_along_axis(effects, axis_of_step, found, axis=1)
+    slopes = signs * np.diff(outcome, axis=1) / STEP
+    effects = np.empty_like(slopes)
+    np.put_along_axis(effects, axis_of_step, slopes, axis=1)
     about = band(effects)
     counts = np.isfinite(effects).sum(axis=0)
     ends = zip(about.mean, about.pointwise_low, about.pointwise_high, counts, strict=True)

@@ -33,10 +33,10 @@ def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
         level: Confidence level.
     """
     means = person_means(values, person)[1]
-    found = band(means[:, np.newaxis], level)
-    low = float(found.pointwise_low[0])
-    high = float(found.pointwise_high[0])
-    return Interval(float(found.mean[0]), low, high, len(means))
+    bands = band(means[:, np.newaxis], level)
+    low = float(bands.pointwise_low[0])
+    high = float(bands.pointwise_high[0])
+    return Interval(float(bands.mean[0]), low, high, len(means))
 
 
 def paired_difference(

@@ -98,8 +98,8 @@ class Journal:
         lines, _, rest = whole.rpartition(b"\n")
         try:
             for line in lines.splitlines():
-                kept = json.loads(line)
-                self.outcomes[kept["profile"], kept["seed"]] = outcome_of(kept)
+                row = json.loads(line)
+                self.outcomes[row["profile"], row["seed"]] = outcome_of(row)
         except (ValueError, KeyError, TypeError) as error:
             raise ConfigError(f"is no journal of storms: {error}", file) from None
         if rest:  # of a process that was killed while it wrote
@@ -121,12 +121,12 @@ def plain(outcome: StormOutcome) -> dict[str, Any]:
     }
 
 
-def outcome_of(kept: dict[str, Any]) -> StormOutcome:
+def outcome_of(row: dict[str, Any]) -> StormOutcome:
     """Return an outcome from JSON."""
-    fields = {key: value for key, value in kept.items() if key not in ("profile", "breaches")}
+    fields = {key: value for key, value in row.items() if key not in ("profile", "breaches")}
     for counted in ("faults", "messages"):
         fields[counted] = Counter(fields[counted])
-    return StormOutcome(**fields, breaches=[Breach(**each) for each in kept["breaches"]])
+    return StormOutcome(**fields, breaches=[Breach(**each) for each in row["breaches"]])
 
 
 def outcomes(
@@ -143,9 +143,9 @@ def outcomes(
     waiting = set[Future[StormOutcome]]()
     with workers.executor(workers.width, play_seed) as executor:
         for seed in seeds:
-            known = journal.outcomes.get((profile, seed))
-            if known is not None:
-                yield known, True
+            outcome = journal.outcomes.get((profile, seed))
+            if outcome is not None:
+                yield outcome, True
                 continue
             waiting.add(executor.submit(play_seed, seed, profile))
             while len(waiting) >= 2 * workers.width:

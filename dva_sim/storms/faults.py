@@ -127,9 +127,9 @@ def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None
     orders = [each for each in past if any(kind in each.payload for kind in _ORDERS)]
     for passing in orders[-1:]:
         for number in range(FORGOTTEN_AFTER):
-            asked = m.Message(robot, 2**29 + number, passing.source, "12:00:00", 0, _HARMLESS)
+            order = m.Message(robot, 2**29 + number, passing.source, "12:00:00", 0, _HARMLESS)
             after = fault.value * number / FORGOTTEN_AFTER
-            clock.call_after(after, storm.intruder.send, robot, encode(asked))
+            clock.call_after(after, storm.intruder.send, robot, encode(order))
         storm.interference.later(passing, fault.value + 0.5)
 
 

@@ -199,13 +199,13 @@ def holds_tilt(speed: float, chance: random.Random) -> Meddling:
 
 def freezes_pictures(_: float, __: random.Random) -> Meddling:
     """Show the first picture for ever, each time with the tick of the present one: a lie."""
-    shown: dict[str, CameraFrame] = {}
+    first_frames: dict[str, CameraFrame] = {}
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         frame = passing.payload
         if not isinstance(frame, CameraFrame):
             return False
-        first = shown.setdefault(passing.source, frame)
+        first = first_frames.setdefault(passing.source, frame)
         lie = first.observation._replace(tick=frame.observation.tick)
         interference.deliver(passing._replace(payload=frame._replace(observation=lie)))
         return True

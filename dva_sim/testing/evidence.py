@@ -53,7 +53,7 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
     problems = list[Problem]()
     for number, (sent, data) in enumerate(messages, 1):
         where = f"message {number}, at {sent.time:.1f} s, from {sent.source}"
-        problems += [Problem(1, 1, f"{where}: {found.text}") for found in check_message(data)]
+        problems += [Problem(1, 1, f"{where}: {problem.text}") for problem in check_message(data)]
     if opened.left_out:
         lacking = listed((f"{topic} {n}" for topic, n in sorted(opened.left_out.items())), 4)
         problems.append(Problem(1, 1, f"was filtered: messages are missing, by topic: {lacking}"))
@@ -63,10 +63,10 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
         problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
         note += f", {replayed.decisions} decisions of {who}"
     if opened.audit:
-        found = verify_plain(opened.audit)
-        if wrong := found.problem:
+        problem = verify_plain(opened.audit)
+        if wrong := problem.problem:
             problems.append(Problem(1, 1, f"audit log: row {wrong.number} {wrong.text}"))
-        note += f", an audit log whose last row is {found.rows} with the hash {found.head}"
+        note += f", an audit log whose last row is {problem.rows} with the hash {problem.head}"
     doubts = [] if opened.is_whole else ["was cut short"]
     if is_part(path):
         doubts = [UNFINISHED]
@@ -85,15 +85,15 @@ def judged_recording(opened: Opened) -> list[Verdict]:
     from dva_sim.simulation.full import verdicts as v  # late: start-up
 
     until = "" if opened.is_whole else f", up to {opened.playback.duration:.0f} s"
-    found = v.judged(opened.playback.recorder.facts, opened.terms, until)
+    judged = v.judged(opened.playback.recorder.facts, opened.terms, until)
     topics = missing_topics(opened)
     verdicts = list[v.Verdict]()
-    for rule in dict.fromkeys([*v.RULES, *(verdict.rule for verdict in found)]):
+    for rule in dict.fromkeys([*v.RULES, *(verdict.rule for verdict in judged)]):
         if lacking := topics.get(rule):
             text = f"the recording lacks {listed(lacking)}"
             verdicts.append(v.Verdict(rule, v.NOT_JUDGED, text, lacks_facts=True))
         else:
-            verdicts += [verdict for verdict in found if verdict.rule == rule]
+            verdicts += [verdict for verdict in judged if verdict.rule == rule]
     return verdicts
 
 
@@ -124,7 +124,7 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
         "heard": ("S2",),
         "places": ("S6",),
     }
-    found: dict[str, list[str]] = {}
+    topics: dict[str, list[str]] = {}
     for topic in _lacking(opened):
         rules: tuple[str, ...] = (*RULES, *regional)
         if topic.startswith(OBSERVED):
@@ -135,8 +135,8 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
             rules = ()  # drawn, and not judged
         for rule in rules:
             if rule in (*OF_THE_DVA, *regional) or terms.motors:
-                found.setdefault(rule, []).append(topic)
-    return found
+                topics.setdefault(rule, []).append(topic)
+    return topics
 
 
 def _lacking(opened: Opened) -> Iterator[str]:
@@ -172,15 +172,15 @@ def check_audit_log(path: Path) -> Found:
     from dva_sim.recordings.audit_log import verify  # late: start-up
 
     try:
-        found = verify(path)
+        verified = verify(path)
     except ConfigError as error:
         return [Problem(1, 1, error.problem)], [], ""
-    wrong = found.problem
+    wrong = verified.problem
     problems = (
         [] if wrong is None else [Problem(wrong.number, 1, f"row {wrong.number} {wrong.text}")]
     )
-    rows = "1 row" if found.rows == 1 else f"{found.rows} rows"
-    return problems, list(found.doubts), f"{rows}, the last one with the hash {found.head}"
+    rows = "1 row" if verified.rows == 1 else f"{verified.rows} rows"
+    return problems, list(verified.doubts), f"{rows}, the last one with the hash {verified.head}"
 
 
 def check_recorded_link(path: Path) -> Found:

@@ -134,17 +134,17 @@ def _collect(
     check: Callable[[], Iterator[ConfigError]],
     blame: Callable[[ConfigError], ConfigError],
 ) -> list[Problem]:
-    found = []
+    problems = []
     try:
         for error in check():
-            found.append(_problem(path, blame(error)))
+            problems.append(_problem(path, blame(error)))
     except ConfigError as error:
-        found.append(_problem(path, blame(error)))
+        problems.append(_problem(path, blame(error)))
     except RecursionError:
-        found.append(Problem(1, 1, "is nested too deeply"))
+        problems.append(Problem(1, 1, "is nested too deeply"))
     except _HOSTILE as error:
-        found.append(Problem(1, 1, f"cannot be read: {error}"))
-    return list(dict.fromkeys(found))
+        problems.append(Problem(1, 1, f"cannot be read: {error}"))
+    return list(dict.fromkeys(problems))
 
 
 def _problem(path: Path, error: ConfigError) -> Problem:
@@ -170,12 +170,14 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
 
 def _check_registration(document: Document) -> Iterator[ConfigError]:
     """Yield the registration, and whether the study beside it is still what was registered."""
-    found = load_registration(document)
-    file = document.file.parent / f"{found.study}.yaml"
+    registered = load_registration(document)
+    file = document.file.parent / f"{registered.study}.yaml"
     if not file.is_file():
         yield document.error(f"{file.name}, the study it is of, is not beside it", ("study",))
         return
-    for problem in departures(found, load_study(file, version="full" if found.full else None)):
+    for problem in departures(
+        registered, load_study(file, version="full" if registered.full else None)
+    ):
         yield document.error(problem, ("plan",))
 
 

@@ -141,13 +141,13 @@ class _Trial:
 
     def _answers(self, field: HazardField, order: list[int] | None = None) -> list[Conditions]:
         """Return the air at all places and ages, asked in an order; told in the usual one."""
-        asked = [(*place, START + age) for age in AGES for place in AROUND]
-        order = order or list(range(len(asked)))
+        queries = [(*place, START + age) for age in AGES for place in AROUND]
+        order = order or list(range(len(queries)))
         began = time.perf_counter()
-        answers = {number: field.at(*asked[number]) for number in order}
-        self.mean = (time.perf_counter() - began) / len(asked)
-        self.asked += len(asked)
-        return [answers[number] for number in range(len(asked))]
+        answers = {number: field.at(*queries[number]) for number in order}
+        self.mean = (time.perf_counter() - began) / len(queries)
+        self.asked += len(queries)
+        return [answers[number] for number in range(len(queries))]
 
     def _air(self) -> Iterator[Case]:
         """Yield numbers that air can have, where it is and nowhere else."""
@@ -210,13 +210,13 @@ class _Trial:
         y = np.arange(south, north, CELL)
         places = SitePoints(building_of(self._site), np.stack(np.meshgrid(x, y), axis=2))
         for what in (*QUANTITIES, "layer"):
-            shown = ("smoke" if what == "layer" else what) in self._hazard().shows
+            is_shown = ("smoke" if what == "layer" else what) in self._hazard().shows
             for when in (START, START + 20.0, START + 601.0):
                 began = time.perf_counter()
                 values = field.picture(what, places, when)
                 self._picture = max(self._picture, time.perf_counter() - began)
                 if values is None:
-                    if shown:
+                    if is_shown:
                         yield "has no picture of what it shows", what
                     continue
                 if values.shape != places.spaces.shape:

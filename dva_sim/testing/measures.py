@@ -55,10 +55,10 @@ def check_measure(
     if options:
         raise ConfigError(f"measure {measure!r} has no option {next(iter(options))!r}; it has none")
     make = type(load_measure(measure)) if isinstance(measure, str) else measure
-    known = [name for name in MODELS if reads(make(), name)]
-    if not known:
+    models = [name for name in MODELS if reads(make(), name)]
+    if not models:
         raise ConfigError(f"should read one of our models to be tried: models = {tuple(MODELS)}")
-    trial = _Trial(make, known)
+    trial = _Trial(make, models)
     broken = broken_in(part_by_part((trial.says_what_it_is, trial.answer_all)))
     slowest = max(trial.took, default=0.0)
     is_mute = not broken and not any(map(math.isfinite, trial.answers))

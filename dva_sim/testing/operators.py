@@ -244,18 +244,18 @@ class _Trial:
         for number in range(round(seconds / FRAME)):
             view = View(number * FRAME, pictures[-late - 1], max(delay, FRAME))
             started = time.perf_counter()
-            wanted = Intent(*strategy.drive(route, view, STOP))
+            intent = Intent(*strategy.drive(route, view, STOP))
             spent += time.perf_counter() - started
-            track.append(_Step(view.now, x, y, wanted))
-            middle = heading + 0.5 * wanted.turn_rate * FRAME
-            x += wanted.speed * FRAME * math.cos(middle)
-            y += wanted.speed * FRAME * math.sin(middle)
-            heading += wanted.turn_rate * FRAME
+            track.append(_Step(view.now, x, y, intent))
+            middle = heading + 0.5 * intent.turn_rate * FRAME
+            x += intent.speed * FRAME * math.cos(middle)
+            y += intent.speed * FRAME * math.sin(middle)
+            heading += intent.turn_rate * FRAME
             y += push if number == round(PUSHED_AT / FRAME) else 0.0
             tick = round(1000 * (number + 1) * FRAME)
             pictures.append(
                 Observation(
-                    tick, x, y, heading, speed=wanted.speed, turn_rate=wanted.turn_rate, hazards=()
+                    tick, x, y, heading, speed=intent.speed, turn_rate=intent.turn_rate, hazards=()
                 )
             )
             long = track[-round(2 * REST / FRAME) :]

@@ -266,7 +266,7 @@ def check_policy(
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
     one, twin = (load_policy(policy, options) for _ in range(2))
-    found: dict[str, list[str]] = {}
+    breaches: dict[str, list[str]] = {}
     slowest = 0.0, ""
     for number, (kind, situation) in enumerate(situations(one, count, 1), start=1):
         where = f"situation {number} ({kind})"
@@ -274,11 +274,11 @@ def check_policy(
         other = _ask(twin, situation, number)
         slowest = max(slowest, (min(answer.took, other.took), where))
         for promise, case in _broken(one, situation, answer, other):
-            found.setdefault(promise, []).append(f"{case}in {where}")
-    dropped = found.pop(TOO_MANY_ROBOTS, [])
+            breaches.setdefault(promise, []).append(f"{case}in {where}")
+    dropped = breaches.pop(TOO_MANY_ROBOTS, [])
     warnings = [line(TOO_MANY_ROBOTS, dropped)] if dropped else []
     warnings += is_slow(slowest[0], slow, f"in {slowest[1]}")
-    return kept([line(*each) for each in found.items()], warnings, count, slowest[0])
+    return kept([line(*each) for each in breaches.items()], warnings, count, slowest[0])
 
 
 @dataclass(frozen=True)
@@ -326,20 +326,20 @@ def _broken(
 def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:
     """Yield the advice of a wrong type, or about what is not there."""
     stations = len(situation.cover.stations) if situation.cover else 0
-    wanted = {
+    lengths = {
         Assignment: {"task": len(situation.tasks), "responder": len(situation.responders)},
         Announcement: {"task": len(situation.tasks)},
         Relocation: {"responder": len(situation.responders), "station": stations},
     }
     for piece in advice:
-        if type(piece) not in wanted:
+        if type(piece) not in lengths:
             yield "gives something that is no advice", f"a {type(piece).__name__} "
             continue
         if isinstance(piece, Announcement) and not policy.auctions:
             yield "announces a task without `auctions = True`", ""
         if isinstance(piece, Relocation) and not policy.relocates:
             yield "relocates somebody without `relocates = True`", ""
-        for name, count in wanted[type(piece)].items():
+        for name, count in lengths[type(piece)].items():
             if not _is_place(place := getattr(piece, name), count):
                 yield f"names a {name} that is not there", f"{place!r} of {count} "
 

@@ -62,24 +62,24 @@ def kept(broken: Sequence[str], warnings: Sequence[str], tries: int, slowest: fl
     return outcome
 
 
-def tried(check: Callable[..., Outcome], *given: Any, **options: Any) -> Outcome:
+def tried(check: Callable[..., Outcome], *arguments: Any, **options: Any) -> Outcome:
     """Run a check and return its outcome, even if promises were broken.
 
     Raises:
         ConfigError: there is nothing to try.
     """
     try:
-        return check(*given, **options)
+        return check(*arguments, **options)
     except BrokenPromises as error:
         return error.outcome
 
 
 def broken_in(cases: Iterable[Case]) -> list[str]:
     """Return a line for each promise that is broken, with the first case of it."""
-    found: dict[str, list[str]] = {}
+    breaches: dict[str, list[str]] = {}
     for promise, case in cases:
-        found.setdefault(promise, []).append(case)
-    return [line(promise, own) for promise, own in found.items()]
+        breaches.setdefault(promise, []).append(case)
+    return [line(promise, own) for promise, own in breaches.items()]
 
 
 def is_slow(slowest: float, slow: float, what: str) -> list[str]:
@@ -146,8 +146,8 @@ class CheckedKind:
 
     def load_plugins(self) -> Plugins[Any]:
         """Load the plug-ins of this kind."""
-        found: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
-        return found
+        plugins: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
+        return plugins
 
     @property
     def group(self) -> str:
@@ -176,8 +176,8 @@ class CheckedKind:
     def load_check(self) -> Callable[..., Outcome]:
         """Load the check that users call in their own tests, by name or class, with options."""
         module = import_module(f"dva_sim.testing.{self.module}")
-        found: Callable[..., Outcome] = getattr(module, f"check_{self.kind}")
-        return found
+        check: Callable[..., Outcome] = getattr(module, f"check_{self.kind}")
+        return check
 
     def ways(self, outcome: Outcome) -> str:
         """Describe how it was checked."""

@@ -117,9 +117,9 @@ class _Trial:
         drive = self._new()
         spec = self.spec
         for _ in range(500):
-            asked = self._command()
-            speed, turn_rate = drive.set_point(*asked)
-            case = f"({speed!r}, {turn_rate!r}) for {_velocity_text(*asked)}"
+            command = self._command()
+            speed, turn_rate = drive.set_point(*command)
+            case = f"({speed!r}, {turn_rate!r}) for {_velocity_text(*command)}"
             if not (math.isfinite(speed) and math.isfinite(turn_rate)):
                 yield "aims at what is no number", case
             elif not -SLACK <= speed <= spec.max_speed + SLACK:
@@ -153,9 +153,9 @@ class _Trial:
             ticks = 0
             started = time.perf_counter()
             for _ in range(COMMANDS):
-                wanted = state.drive.set_point(*self._command())
+                set_point = state.drive.set_point(*self._command())
                 for _ in range(round(2.0 / state.dt)):
-                    state.step(*wanted)
+                    state.step(*set_point)
                     ticks += 1
                     yield from self._within(state, f"in drive {number + 1}")
             self.took.append((time.perf_counter() - started) / ticks)

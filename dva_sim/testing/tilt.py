@@ -320,25 +320,25 @@ class _MappingTrial:
 
     def _tilts(self) -> Iterator[Case]:
         mapping = self.make()
-        for wanted in ((-1.0, 0.0), (0.0, 30.0), (10.0, -30.0), (5.0, 0.0), (2.0, 1e-9)):
+        for command in ((-1.0, 0.0), (0.0, 30.0), (10.0, -30.0), (5.0, 0.0), (2.0, 1e-9)):
             for shown in ((0.0, 0.0), (10.0, 30.0), (4.0, -30.0)):
-                reading = mapping.tilt_for(wanted, shown, WITHIN)
+                reading = mapping.tilt_for(command, shown, WITHIN)
                 if not all(map(math.isfinite, reading)):
-                    yield "would tilt to what is no number", f"for {_pair_text(wanted)}"
+                    yield "would tilt to what is no number", f"for {_pair_text(command)}"
 
     def _steered(self) -> Iterator[Case]:
         """Yield a hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
-        for wanted in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
+        for command in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
             mapping = self.make()
             shown = (0.0, 0.0)
             shown = mapping.command(0.0, 0.0, PERIOD)
             for _ in range(round(20 * WITHIN / PERIOD)):
-                level, turn = mapping.tilt_for(wanted, shown, WITHIN)
+                level, turn = mapping.tilt_for(command, shown, WITHIN)
                 shown = mapping.command(_cut(level, HAND[0]), _cut(turn, HAND[1]), PERIOD)
-            if not _near(shown, (max(wanted[0], 0.0), wanted[1])):
+            if not _near(shown, (max(command[0], 0.0), command[1])):
                 yield (
                     "does not get where tilt_for tilts to",
-                    (f"{_pair_text(shown)} when {_pair_text(wanted)} is wanted"),
+                    (f"{_pair_text(shown)} when {_pair_text(command)} is wanted"),
                 )
 
 

@@ -107,17 +107,17 @@ class _Trial:
         yield from self._arrived(CARRIES, taken, robot.heard, near)
 
     def _arrived(
-        self, promise: str, sent: list[bytes], found: list[bytes], near: TransportEnd
+        self, promise: str, sent: list[bytes], received: list[bytes], near: TransportEnd
     ) -> Iterator[Case]:
         """Wait for the last one: those before it may have been given up for it."""
         start = time.monotonic()
-        while sent and sent[-1] not in found and time.monotonic() < start + ARRIVES_S:
+        while sent and sent[-1] not in received and time.monotonic() < start + ARRIVES_S:
             yield from _served(near)
         self.count += len(sent)
         self.slowest = max(self.slowest, time.monotonic() - start)
-        if sent and sent[-1] not in found:
+        if sent and sent[-1] not in received:
             yield promise, f"the last of {len(sent)} did not come within {ARRIVES_S:g} s"
-        if others := [data for data in found if data not in sent]:
+        if others := [data for data in received if data not in sent]:
             yield promise, f"{others[0][:40]!r} was not sent"
 
     def _stay_away(self) -> Iterator[Case]:

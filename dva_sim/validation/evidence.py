@@ -183,8 +183,8 @@ def state_of_rule(lines: Iterable[Evidence]) -> str:
 
 def _shortfall(line: Evidence) -> str:
     note = f", {line.note}" if line.note else ""
-    asked = _range(line.low, line.high)
-    return f"{line.line} ({short_number(line.predicted)}{note}; asked for: {asked})"
+    target = _range(line.low, line.high)
+    return f"{line.line} ({short_number(line.predicted)}{note}; asked for: {target})"
 
 
 def read_evidence(path: Path) -> list[Evidence]:

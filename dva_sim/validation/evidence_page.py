@@ -154,14 +154,14 @@ def sheets_of(lines: Sequence[Evidence], most: int | None = None) -> list[Result
 
 def _sheet(title: str, lines: Sequence[Evidence], most: int | None) -> ResultSheet:
     """Return the lines of a group; a row of one cell is the source of those below it."""
-    shown = lines
+    printed = lines
     text = ""
     if most is not None and len(lines) > most:
         # A terminal would scroll the head away.
-        shown = [line for line in lines if line.verdict in ("misses", "too rough")]
+        printed = [line for line in lines if line.verdict in ("misses", "too rough")]
         text = f"{count_of(lines)}." if judged(lines) else ""
     rows: list[tuple[str, ...]] = []
-    for source, own in groupby(shown, lambda line: line.source):
+    for source, own in groupby(printed, lambda line: line.source):
         rows += [(source,)] if source else []
         rows += [line.words for line in own]
     return ResultSheet(title, HEADS, rows, text)

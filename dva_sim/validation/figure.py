@@ -75,9 +75,9 @@ def _draw_panel(axes: Axes, lines: Sequence[Evidence]) -> None:
     axes.axhline(1.0, color=SOFT, lw=0.7, zorder=2)
     for verdict, own in marks.items():
         for marker, least, most in (("v", 0, low), (None, low, high), ("^", high, math.inf)):
-            shown = [(m.measured, m.predicted) for m in own if least < m.predicted <= most]
-            if shown:  # no bounding box of nothing
-                x, y = np.transpose(shown)
+            points = [(m.measured, m.predicted) for m in own if least < m.predicted <= most]
+            if points:  # no bounding box of nothing
+                x, y = np.transpose(points)
                 look = _MARKS[verdict] | ({"marker": marker} if marker else {})
                 axes.plot(x, np.clip(y, low, high), ls="", clip_on=False, zorder=3, **look)
     axes.set(

@@ -499,9 +499,9 @@ class RobotBody(Body):
         have stopped it, as somebody pushes.
         """
         body = self.body
-        wanted, wanted_spin, end = self._asked.at(tick)
+        wanted_speed, wanted_spin, end = self._asked.at(tick)
         if tick >= end or not self._powered:
-            wanted = wanted_spin = 0.0
+            wanted_speed = wanted_spin = 0.0
         velocity = body.velocity
         spin = body.angular_velocity
         vx = velocity.x
@@ -512,7 +512,7 @@ class RobotBody(Body):
         sin = math.sin(angle)
         forward = vx * cos + vy * sin
         sideways = vy * cos - vx * sin
-        if wanted == wanted_spin == 0.0:
+        if wanted_speed == wanted_spin == 0.0:
             if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
                 body.velocity = (0.0, 0.0)
                 body.angular_velocity = 0.0
@@ -528,13 +528,13 @@ class RobotBody(Body):
                 self._lock.open()
             if self._touch.touching:
                 self._jam.strain(*self.pose(), dt)
-        along, turn = self.motors.accelerations(wanted, wanted_spin, forward, spin, dt)
+        along, turn = self.motors.accelerations(wanted_speed, wanted_spin, forward, spin, dt)
         across = -sideways / dt
         most = self._grip * G
-        asked = math.hypot(along, across)
-        if asked > most:
-            along = along * most / asked
-            across = across * most / asked
+        force = math.hypot(along, across)
+        if force > most:
+            along = along * most / force
+            across = across * most / force
         along = self._mass * along
         across = self._mass * across
         torque = self._moment * turn

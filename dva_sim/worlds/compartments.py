@@ -163,15 +163,15 @@ def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
     from scipy.ndimage import label  # late: start-up
 
     labels = np.full(floor.shape, NOWHERE, np.int16)
-    found = 0
+    total = 0
     across = max(BLOCK / resolution, math.sqrt(np.count_nonzero(floor) / MOST_BLOCKS))
     rows, columns = (_cuts(length, across) for length in floor.shape)
     for top, bottom in itertools.pairwise(rows):
         for left, right in itertools.pairwise(columns):
             part, count = label(floor[top:bottom, left:right])
-            labels[top:bottom, left:right][part > 0] = part[part > 0] + (found - 1)
-            found += count
-            if found > MOST_PIECES:
+            labels[top:bottom, left:right][part > 0] = part[part > 0] + (total - 1)
+            total += count
+            if total > MOST_PIECES:
                 raise ConfigError(f"the floor of a map has more than {MOST_PIECES:,} pieces")
     return labels
 

@@ -125,13 +125,13 @@ def _camera(feature: Feature, name: str) -> FixedCamera:
 
 def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
     """Return detectors in the order of the file, numbered by kind."""
-    found: list[Detector] = []
+    detectors: list[Detector] = []
     for feature in features:
         sensor = feature.kind.removesuffix("_detector")
-        number = 1 + sum(other.kind == sensor for other in found)
+        number = 1 + sum(other.kind == sensor for other in detectors)
         name = feature.drawn.name or f"{sensor}-{number}"
-        found.append(Detector(name, sensor, feature.shape.x, feature.shape.y))
-    return tuple(found)
+        detectors.append(Detector(name, sensor, feature.shape.x, feature.shape.y))
+    return tuple(detectors)
 
 
 def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
@@ -204,9 +204,9 @@ def _rims(rooms: tuple[Room, ...], drawn: Any) -> Iterator[Any]:
 def _sides(solid: Any) -> Points:
     """Return the sides `(n, 4)` [m] of a solid, cut where its pieces without holes are."""
     sides = np.vstack([segments(piece) for piece in _without_holes(solid)])
-    known = [side(each[:2], each[2:]) for each in sides]
-    times = Counter(known)  # two pieces share a cut, which is no side of the solid
-    return sides[[times[each] == 1 for each in known]] if solid.interiors else sides
+    keys = [side(each[:2], each[2:]) for each in sides]
+    times = Counter(keys)  # two pieces share a cut, which is no side of the solid
+    return sides[[times[each] == 1 for each in keys]] if solid.interiors else sides
 
 
 def _without_holes(area: Any) -> Iterator[Any]:

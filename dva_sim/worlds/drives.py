@@ -140,9 +140,9 @@ class ThreeWay(Drive):
         along, _ = self._motor.accelerations(speed, 0.0, now_speed, 0.0, dt)
         rolls = abs(now_speed) > CREEP
         now = min(max(now_turn_rate / now_speed, -self._most), self._most) if rolls else 0.0
-        wanted = turn_rate / speed if speed > 0.0 else now  # who brakes keeps the wheel
+        target = turn_rate / speed if speed > 0.0 else now  # who brakes keeps the wheel
         step = self._most * dt / self._servo if rolls and self._servo > 0.0 else math.inf
-        curvature = now + min(max(wanted - now, -step), step)
+        curvature = now + min(max(target - now, -step), step)
         return along, ((now_speed + along * dt) * curvature - now_turn_rate) / dt
 
 
@@ -177,8 +177,8 @@ class GuardedDrive(Guard, Drive):
     ) -> tuple[float, float]:
         """Limit the accelerations; brake on an invalid answer."""
         spec = self.spec
-        given = (speed, turn_rate, now_speed, now_turn_rate, dt)
-        got = self._answer(self.drive.accelerations, *given)
+        motion = (speed, turn_rate, now_speed, now_turn_rate, dt)
+        got = self._answer(self.drive.accelerations, *motion)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
         self._judge_motion(along, turn, now_speed, now_turn_rate, dt=dt)
         # Who was pushed beyond a limit comes back as fast as the accelerations allow.

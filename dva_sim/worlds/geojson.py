@@ -93,8 +93,8 @@ class DrawnWifi(DrawnFeature):
     @property
     def numbers(self) -> dict[str, float]:
         """The numbers that the feature gives."""
-        given = {name: getattr(self, name) for name in LinkQuality._fields}
-        return {name: value for name, value in given.items() if value is not None}
+        numbers = {name: getattr(self, name) for name in LinkQuality._fields}
+        return {name: value for name, value in numbers.items() if value is not None}
 
     @property
     def link(self) -> LinkQuality:
@@ -162,8 +162,8 @@ class Feature:
     @property
     def drawn(self) -> Any:
         """The properties, checked: an instance of its kind's model."""
-        given = {key: value for key, value in self.properties.items() if value is not None}
-        return validate(KINDS[self.kind].model, given, lambda text, _: self.fail(text))
+        properties = {key: value for key, value in self.properties.items() if value is not None}
+        return validate(KINDS[self.kind].model, properties, lambda text, _: self.fail(text))
 
 
 # --- reading ---------------------------------------------------------------------------

@@ -146,18 +146,18 @@ def _crossings(
 ) -> tuple[tuple[Box, ...], ...]:
     """Cross corridors evenly along the others, each a few metres off."""
     count = max(1, round(width / CROSSING_EVERY))
-    found = []
+    crossings = []
     for number in range(count):
         wide = tenths(rng.uniform(*CORRIDOR))
         middle = width * (number + 0.5) / count + rng.uniform(-0.1, 0.1) * width / count
         x1 = tenths(middle - wide / 2)
-        found.append(
+        crossings.append(
             tuple(
                 (x1, south[3], tenths(x1 + wide), north[1])
                 for south, north in itertools.pairwise(corridors)
             )
         )
-    return tuple(found)
+    return tuple(crossings)
 
 
 def _lobby(corridor: Box, width: float, rng: np.random.Generator) -> Box:

@@ -90,8 +90,8 @@ class PersonBody(Body):
             return bool(self._asked.coming)
         ax = (wx - vx) / RELAXATION
         ay = (wy - vy) / RELAXATION
-        asked = math.hypot(ax, ay)
-        share = MASS * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
+        wish = math.hypot(ax, ay)
+        share = MASS * min(1.0, MOST_PUSH / wish) if wish > 0.0 else 0.0
         self.body.force = (ax * share, ay * share)
         return True
 
@@ -204,14 +204,14 @@ class World(Ticks):
 
     def neighbours(self, x: float, y: float, within: float) -> list[tuple[Body, float]]:
         """Robots and people whose middle is within a distance [m] of a point, the nearest first."""
-        found = []
+        neighbours = []
         for hit in self.space.point_query((x, y), within, _MOVERS):
             assert hit.shape is not None
             body = self._by_shape[hit.shape]
             distance = math.hypot(body.x - x, body.y - y)
             if distance <= within:
-                found.append((body, distance))
-        return sorted(found, key=lambda pair: (pair[1], pair[0].name))
+                neighbours.append((body, distance))
+        return sorted(neighbours, key=lambda pair: (pair[1], pair[0].name))
 
     # --- contacts ----------------------------------------------------------------------
 

@@ -159,8 +159,8 @@ class Site(FloorPlan):
         for room in self.rooms:
             if room.name == name:
                 return room
-        known = [room.name for room in self.rooms]
-        text = hint(name, known, "rooms") if known else "a bare map names no rooms"
+        names = [room.name for room in self.rooms]
+        text = hint(name, names, "rooms") if names else "a bare map names no rooms"
         raise ConfigError(f"site {self.name!r} has no room {name!r}; {text}")
 
     def is_free(self, x: float, y: float, clearance: float) -> bool:
@@ -243,13 +243,13 @@ class Site(FloorPlan):
         free = reached & (grid.clearance >= clearance)
         if room is None:
             return np.flatnonzero(free)
-        known = self.room(room)
-        window = grid.window(known.polygon)
+        room_there = self.room(room)
+        window = grid.window(room_there.polygon)
         inside = np.nonzero(free[window])
-        rows, columns = (found + part.start for found, part in zip(inside, window, strict=True))
+        rows, columns = (indices + part.start for indices, part in zip(inside, window, strict=True))
         middles = grid.to_xy(rows + 0.5, columns + 0.5)
         cells: NDArray[np.int64] = rows * grid.cells.shape[1] + columns
-        return cells[shapely.contains_xy(self.ground_of(known), middles)]
+        return cells[shapely.contains_xy(self.ground_of(room_there), middles)]
 
     def ground_of(self, room: Room) -> Any:
         """Return the shapely area of a room; of ground outdoors what nothing else is drawn over."""
@@ -379,7 +379,7 @@ def _scatter(
     """
     apart = max(BASE_SPACING, 2.5 * radius)
     places = _Places(site, radius + 2 * site.grid.resolution, apart, (*drawn, *others))
-    found: list[Pose] = []
+    poses: list[Pose] = []
     for number in range(len(drawn) + 1, count + 1):
         rng = streams.fresh(f"site/{what}-{number}")
         place = places.draw(rng)
@@ -387,8 +387,8 @@ def _scatter(
             kind = what.partition("-")[0]
             fit = f"{number - 1} {kind}s of the scenario's {count}"
             raise ConfigError(f"site {site.name!r} has room for {fit}")
-        found.append(Pose(*place, float(rng.uniform(-np.pi, np.pi))))
-    return tuple(found)
+        poses.append(Pose(*place, float(rng.uniform(-np.pi, np.pi))))
+    return tuple(poses)
 
 
 class _Places:
@@ -563,8 +563,8 @@ def _features(
     if config.generate is not None:
         return office_block(_with_options(config.name, config.generate, options))
     if options:
-        given = ", ".join(options)
-        raise ConfigError(f"site {config.name!r} is drawn and takes no options; given: {given}")
+        names = ", ".join(options)
+        raise ConfigError(f"site {config.name!r} is drawn and takes no options; given: {names}")
     file = document.file.parent / str(config.plan)
     if not resources.is_file(file):
         raise document.error(f"plan {config.plan!r} not found", ("plan",))
@@ -573,9 +573,9 @@ def _features(
 
 
 def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> OfficeBlock:
-    known = [key for key in type(block).model_fields if key != "kind"]
+    keys = [key for key in type(block).model_fields if key != "kind"]
     for key in options:
-        if key not in known:
-            raise ConfigError(f"site {name!r} has no option {key!r}; {hint(key, known)}")
+        if key not in keys:
+            raise ConfigError(f"site {name!r} has no option {key!r}; {hint(key, keys)}")
     data = block.model_dump() | dict(options)
     return validate(OfficeBlock, data, lambda text, _: ConfigError(f"site {name!r}: {text}"))

@@ -119,8 +119,8 @@ def beyond(rooms: Lookup[Room], x: float, y: float, heading: float) -> Room | No
     """Find the room on one side of a door, given its middle [m] and the direction [rad]."""
     cos = math.cos(heading)
     sin = math.sin(heading)
-    found = (rooms.at(x + far * cos, y + far * sin) for far in PROBES)
-    return next((room for room in found if room is not None), None)
+    beyond_door = (rooms.at(x + far * cos, y + far * sin) for far in PROBES)
+    return next((room for room in beyond_door if room is not None), None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -324,17 +324,17 @@ def _handles(site: Site, coverage: bool) -> list[Artist]:
 
 def _areas(site: Site, coverage: bool) -> list[Artist]:
     outdoor = {room.paved for room in site.rooms if room.outdoor}
-    found: list[Artist] = [Patch(fc=PAVING, label="path")] if True in outdoor else []
-    found += [Patch(fc=GRASS, label="yard")] if False in outdoor else []
+    artists: list[Artist] = [Patch(fc=PAVING, label="path")] if True in outdoor else []
+    artists += [Patch(fc=GRASS, label="yard")] if False in outdoor else []
     for use in dict.fromkeys(zone.use for zone in site.zones):
         colour, hatch = ZONES[use]
-        found.append(Patch(fc="none", ec=colour, hatch=hatch, lw=0.6, label=use))
+        artists.append(Patch(fc="none", ec=colour, hatch=hatch, lw=0.6, label=use))
     grades = {area.grade for area in site.wifi} if coverage else set()
     for grade in (grade for grade in COVERAGE if grade in grades):
         colour, alpha = COVERAGE[grade]
         label = "no Wi-Fi" if grade == "none" else f"{grade} Wi-Fi"
-        found.append(Patch(fc=colour, alpha=alpha, label=label))
-    return found
+        artists.append(Patch(fc=colour, alpha=alpha, label=label))
+    return artists
 
 
 def _mark(marker: Any, label: str, colour: str, **style: Any) -> Artist:

@@ -178,9 +178,9 @@ def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
     things = shapely.STRtree(_things(site))
     for room in site.rooms:
         area = site.ground_of(room).buffer(-GAP, join_style="mitre")
-        found = _best(area, room.name, things, metre, least)
-        if found is not None:
-            setting, x, y = found
+        layout = _best(area, room.name, things, metre, least)
+        if layout is not None:
+            setting, x, y = layout
             ax.text(
                 x,
                 y,
@@ -217,7 +217,7 @@ def _best(
         return None
     shapely.prepare(area)
     best = 0.0
-    found = None
+    layout = None
     for setting in _settings(name):
         if setting.worth <= best:
             break  # they come from the most to the least legible
@@ -232,8 +232,8 @@ def _best(
         worth = setting.worth * (COVERING if covered.min() else 1.0)
         if worth > best:
             best = worth
-            found = (setting, *spots[np.argmin(covered)].tolist())
-    return found
+            layout = (setting, *spots[np.argmin(covered)].tolist())
+    return layout
 
 
 @lru_cache(maxsize=4096)

@@ -149,8 +149,8 @@ class ControlRoomAgent:
     def _note(self, status: m.EventStatus) -> None:
         """Note the state of an event; replies may overtake publications."""
         number = status.event_id
-        known = self.events.get(status.event_id)
-        if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
+        newest = self.events.get(status.event_id)
+        if newest is not None and (status.age, status.decisions) < (newest.age, newest.decisions):
             return
         self.events[number] = status
         self.received_at[number] = now = self.device.clock.now

@@ -189,8 +189,8 @@ class ScriptedDispatcher:
         return None
 
     def _kind(self, device: str | None) -> str | None:
-        known = self.room.devices.get(device or "")
-        return None if known is None else KINDS.get(known.device_type)
+        entry = self.room.devices.get(device or "")
+        return None if entry is None else KINDS.get(entry.device_type)
 
 
 def _in_words(wish: m.Body, label_of: Callable[[str], str]) -> str:

@@ -199,10 +199,10 @@ class CommandSender:
             self.drive.refusal = self.refusals.last
             self._on_refused(why)
 
-    def _let(self, act: Callable[..., object], *given: Any) -> None:
+    def _let(self, act: Callable[..., object], *arguments: Any) -> None:
         """Ask the pattern; what one of a user gets wrong is counted, and the command is gone."""
         try:
-            act(*given)
+            act(*arguments)
         except FAILURES as error:
             if type(self._pattern) in PATTERNS.values():
                 raise

@@ -116,7 +116,7 @@ class DelayEstimate:
         if steps == 1:
             return past
         share = np.full(steps, 1.0 / steps)
-        return np.stack([np.convolve(asked, share, "valid") for asked in past])
+        return np.stack([np.convolve(requests, share, "valid") for requests in past])
 
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""
@@ -178,8 +178,8 @@ class PeriodEstimate:
 
     def intend(self, now: float, one: float, other: float) -> None:
         """Note what the person asks for from `now` [s] on, as shares of the limits."""
-        for channel, asked in zip(self._channels, (one, other), strict=True):
-            lost = channel.ask(now, self._delay, asks=abs(asked) >= self._habits.noticed)
+        for channel, speed in zip(self._channels, (one, other), strict=True):
+            lost = channel.ask(now, self._delay, asks=abs(speed) >= self._habits.noticed)
             if lost > 0.0:
                 self._weigh(1.0 - np.minimum(lost / self._periods, 1.0))
 
@@ -216,18 +216,18 @@ class PeriodEstimate:
             return move._replace(seen=now)
         if move.ended is None:
             return move
-        asked = move.ended - move.begun
+        length = move.ended - move.begun
         if move.seen is not None and not moves:
-            self._lasted(now - move.seen, asked)
+            self._lasted(now - move.seen, length)
             return None
         if move.seen is None and now > move.ended + self.LATE * delay + self.value:
-            self._weigh(1.0 - np.minimum(asked / self._periods, 1.0))
+            self._weigh(1.0 - np.minimum(length / self._periods, 1.0))
             return None
         return move
 
-    def _lasted(self, lasts: float, asked: float) -> None:
+    def _lasted(self, lasts: float, length: float) -> None:
         """Note how long a move lasted [s]: the whole periods just below or above what was asked."""
-        whole, part = np.divmod(asked / self._periods, 1.0)
+        whole, part = np.divmod(length / self._periods, 1.0)
         less, more = (
             np.exp(-0.5 * ((lasts - count * self._periods) / self.BLURRED) ** 2)
             for count in (whole, whole + 1.0)
@@ -279,8 +279,8 @@ class _Channel:
         if asks and not self._asks:
             if last is not None and last.ended is not None and last.seen is None:
                 lost = last.ended - last.begun if now >= last.ended + delay else 0.0
-            known = last is None or lost > 0.0
-            self.move = _Move(now) if known and not self.moves else None
+            has_begun = last is None or lost > 0.0
+            self.move = _Move(now) if has_begun and not self.moves else None
         elif self._asks and not asks and self.move is not None:
             self.move = self.move._replace(ended=now)
         self._asks = asks

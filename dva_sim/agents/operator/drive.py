@@ -72,7 +72,7 @@ class CloseQuarters:
         """True if the person drives carefully now."""
         return self._from is not None
 
-    def notice(self, now: float, seen: Observation, asked: float, delay: float) -> bool:
+    def notice(self, now: float, seen: Observation, intended_mps: float, delay: float) -> bool:
         """Perceive a frame.
 
         True if from now on the person drives carefully, on a new way.
@@ -80,7 +80,7 @@ class CloseQuarters:
         Args:
             now: [s]
             seen: The frame, as the person judges it.
-            asked: Speed that the person asks for [m/s].
+            intended_mps: Speed that the person asks for [m/s].
             delay: Whole delay as the person perceives it [s].
         """
         here = (seen.x, seen.y)
@@ -89,7 +89,9 @@ class CloseQuarters:
             self._from = None
         if seen.speed >= habits.held_still_mps:
             self._held = 0.0
-        elif asked > habits.asked_mps:  # while turning on the spot is asked for, nothing is learnt
+        elif (
+            intended_mps > habits.asked_mps
+        ):  # while turning on the spot is asked for, nothing is learnt
             self._held += max(now - self._last_look, 0.0)
         self._last_look = now
         if self._held <= habits.understood_after_s + 2.0 * delay:
@@ -258,13 +260,13 @@ class Teleoperation(Work):
         """Count what a plug-in of a user got wrong; tell of the first time."""
         for plugged_in, whose, what in self._plugged_in:
             if plugged_in.failures != self._failures.get(whose, 0):
-                known = self._failures.get(whose, 0)
+                counted = self._failures.get(whose, 0)
                 failures = plugged_in.failures
                 self._failures[whose] = failures
-                if failures > known:
+                if failures > counted:
                     count = self._device.recorder.counters
-                    count[f"failed: an answer of {whose}"] += failures - known
-                    if not known:
+                    count[f"failed: an answer of {whose}"] += failures - counted
+                    if not counted:
                         self._device.tell(f"{what}: {plugged_in.first_failure}", "drive")
 
     def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
@@ -306,9 +308,9 @@ class Teleoperation(Work):
 
     def _consider(self, seen: Observation) -> Route | None:
         """Return the strategy's way, if still needed: is the event in view, is the place empty?"""
-        found = self._looking.look(self._clock.now, seen)
-        if found is not None:
-            self.end(*found)
+        conclusion = self._looking.look(self._clock.now, seen)
+        if conclusion is not None:
+            self.end(*conclusion)
         return None if self.over else self._way(seen)
 
     def _keep_off(self, seen: Observation) -> float:

@@ -162,8 +162,8 @@ class HeldRobot:
         """End a session that is over by the DVA's word; the robot has been told, too."""
         if self.phase != "gone" and session == self.session:
             self.end("gave up")
-            known = "" if self._has_answered else f"; {self._silence()}"
-            self._alert(f"{self.label}: {REVOKED}{known}")
+            silence = "" if self._has_answered else f"; {self._silence()}"
+            self._alert(f"{self.label}: {REVOKED}{silence}")
             self._be_gone()
 
     def taken_back(self, outcome: str) -> None:
@@ -265,8 +265,8 @@ class HeldRobot:
     @property
     def _newest_tick(self) -> int | None:
         """The robot's newest tick that is known here [ms]."""
-        shown = -math.inf if self.frame is None else self.frame.observation.tick
-        newest = max(shown, self._tick)
+        drawn_tick = -math.inf if self.frame is None else self.frame.observation.tick
+        newest = max(drawn_tick, self._tick)
         return None if newest == -math.inf else int(newest)
 
     def _unreachable(self) -> None:
@@ -279,8 +279,8 @@ class HeldRobot:
         where = f" at {self._address}" if self._address else ""
         return f"link lost: no answer{where}"
 
-    def _on_frame(self, shown: CameraFrame | bytes) -> None:
-        frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
+    def _on_frame(self, payload: CameraFrame | bytes) -> None:
+        frame = payload if isinstance(payload, CameraFrame) else CameraFrame.unpack(payload)
         if frame is None or self.phase == "gone":
             return
         now = self.device.clock.now
@@ -396,11 +396,11 @@ class HeldRobot:
         speed = level * SPEED_PER_LEVEL / reach.speed
         self.steered(Input(number, at, speed, math.radians(turn) / reach.turn_rate))
 
-    def steered(self, given: Input) -> None:
+    def steered(self, command: Input) -> None:
         """Take an input, and remember it until it acts."""
-        self.last = given
+        self.last = command
         if self.phase == "driving":
-            self._inputs.append(given)
+            self._inputs.append(command)
 
     def acted(self, made: float, sample_age: float) -> Input | None:
         """Return the newest input behind a command made then, of samples so old on average [s]."""

@@ -157,8 +157,8 @@ class Looking:
             self._evidence.weigh(worth(gap), clear, event.contrast)
         was_there = self.at_place
         self.at_place = self.has_place_before_it(seen, self._habits.at_place_m)
-        found = self._search(gap if was_there else 0.0, seen, event is None)
-        return ("confirmed", "") if self._evidence.sure else found
+        conclusion = self._search(gap if was_there else 0.0, seen, event is None)
+        return ("confirmed", "") if self._evidence.sure else conclusion
 
     def look_away(self) -> None:
         """Turn to something else: what is not seen counts for nothing."""

@@ -182,10 +182,10 @@ class OperatorAgent:
                 if isinstance(reply.content, m.Permission):
                     self._give_back(drive.robot, reply.content.session)
             elif isinstance(reply.content, m.Permission):
-                known = drive.granted
+                was_granted = drive.granted
                 drive.granted = True
                 drive.session = reply.content.session
-                if not known:
+                if not was_granted:
                     self._turn_on_picture(drive)
                     self._start(drive)
             elif reply.code == m.BUSY and not self._asked_again(drive):
@@ -240,9 +240,9 @@ class OperatorAgent:
         device = self.device
         order = drive.order
         device.tell(f"{AS_SEEN.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
-        found = outcome in ("confirmed", "refuted")
+        is_decided = outcome in ("confirmed", "refuted")
         by_dva = outcome in BY_DVA
-        if found:
+        if is_decided:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
             device.report_finding(body)
 
@@ -254,7 +254,7 @@ class OperatorAgent:
             else:
                 # The DVA takes the robot back with the order, unless it has ended that before,
                 # or has meanwhile given the order for another robot.
-                body = m.OrderProgress(order.event_id, "done" if found else "failed")
+                body = m.OrderProgress(order.event_id, "done" if is_decided else "failed")
                 device.ask(device.dva, body, ended, unheard)
             if self._waiting and drive.session:
                 # Before it stands, the robot would refuse to start.

@@ -92,16 +92,16 @@ class PersonAgent:
         self, robots: Sequence[str], on_result: OnResult, level: str = "teleoperation"
     ) -> None:
         """Ask for robots, with one level of permission: all of them, or none is kept."""
-        wanted = [robot for robot in robots if robot not in self.robots]
-        if len(self.robots) + len(wanted) > MOST_ROBOTS:
+        free = [robot for robot in robots if robot not in self.robots]
+        if len(self.robots) + len(free) > MOST_ROBOTS:
             on_result(False, f"one person drives {MOST_ROBOTS} robots at most")
             return
-        if not wanted:
+        if not free:
             on_result(True, "they are yours already")
             return
-        answers = Gathered(len(wanted), on_result)
+        answers = Gathered(len(free), on_result)
         taken = []
-        for robot in wanted:
+        for robot in free:
             held = HeldRobot(
                 self.device,
                 robot,

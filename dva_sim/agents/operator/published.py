@@ -147,8 +147,8 @@ class TargetFile(Config):
         for name, check in self.checks.items():
             for letter in check.tag.split(","):
                 if letter not in self.tags:
-                    known = ", ".join(self.tags)
-                    raise ValueError(f"tag {letter!r} of {name} is unknown; known: {known}")
+                    tags = ", ".join(self.tags)
+                    raise ValueError(f"tag {letter!r} of {name} is unknown; known: {tags}")
         return self
 
 
@@ -341,8 +341,8 @@ def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
     Pointing was watched at lags of up to 0.225 s (MacKenzie & Ware 1993), an excavator at 1.5 s;
     nobody was watched in between.
     """
-    found = [s for s in load_targets().support.values() if strategy in s.strategies]
-    return tuple(sorted(found, key=lambda support: support.low_s))
+    supports = [s for s in load_targets().support.values() if strategy in s.strategies]
+    return tuple(sorted(supports, key=lambda support: support.low_s))
 
 
 def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, float], ...]:

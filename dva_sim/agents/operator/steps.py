@@ -54,11 +54,11 @@ def watch(
         info = reply.content if isinstance(reply.content, m.SensorInfo) else m.SensorInfo("")
         url = info.camera_url
         offered(info.sensors)
-        found = topic(url)
-        if found is None:
+        camera = topic(url)
+        if camera is None:
             blind(url)
         else:
-            seen(device.network.subscribe(device.id_tag, robot, found, on_frame))
+            seen(device.network.subscribe(device.id_tag, robot, camera, on_frame))
 
     device.ask(robot, m.GetSensorInfo(), answered, unreachable, session)
 

@@ -98,9 +98,9 @@ class Work:
         """Turn to another screen."""
         self._looking.look_away()
 
-    def on_frame(self, shown: CameraFrame | bytes) -> None:
+    def on_frame(self, payload: CameraFrame | bytes) -> None:
         """Take a frame on the screen."""
-        frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
+        frame = payload if isinstance(payload, CameraFrame) else CameraFrame.unpack(payload)
         if frame is None:
             self._device.recorder.counters["refused: no picture"] += 1
             return
@@ -181,9 +181,9 @@ class Supervision(Work):
         now = self._clock.now
         judged = self._seat.judge(observation)
         self._device.recorder.view(now, self.robot, judged.x, judged.y, judged.heading)
-        found = self._looking.look(now, judged)
-        if found is not None:
-            self.end(*found)
+        conclusion = self._looking.look(now, judged)
+        if conclusion is not None:
+            self.end(*conclusion)
 
     def _ask(self) -> None:
         """Ask how the mission stands; again when this was answered."""

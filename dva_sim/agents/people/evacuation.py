@@ -129,16 +129,16 @@ def _keeping(
     """Return the nearest refuge on a way that keeps limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
-        found: dict[Point, None] = {}
+        hazardous: dict[Point, None] = {}
         for refuge, way in _nearest_first(planner, here, refuges, avoid):
             judged = [_judge(way, one, habits.close_m) for one in limits[:-1]]
             judged.append(_judge(way, limits[-1], math.inf))
             if all(will_do for will_do, _ in judged):
                 return Escape(refuge, avoid)
-            found.update((place, None) for _, bad in judged for place in bad)
-        if not found:
+            hazardous.update((place, None) for _, bad in judged for place in bad)
+        if not hazardous:
             return None
-        avoid = (*avoid, *(Disc(x, y, habits.keeps_off_m) for x, y in found))
+        avoid = (*avoid, *(Disc(x, y, habits.keeps_off_m) for x, y in hazardous))
     return None
 
 
@@ -149,15 +149,15 @@ def _nearest_first(
 
     No way is shorter than the straight line: none is planned before a known one that is.
     """
-    known: list[tuple[float, int, Floats]] = []
+    planned: list[tuple[float, int, Floats]] = []
     for straight, number in sorted((math.dist(here, at), n) for n, at in enumerate(refuges)):
-        while known and known[0][0] < straight - ROUNDING:
-            _, nearest, way = heappop(known)
+        while planned and planned[0][0] < straight - ROUNDING:
+            _, nearest, way = heappop(planned)
             yield refuges[nearest], way
         way_there = planner.path(here, refuges[number], avoid)
         if way_there is not None:
-            heappush(known, (_length(way_there), number, way_there))
-    for _, nearest, way in sorted(known, key=lambda one: one[:2]):
+            heappush(planned, (_length(way_there), number, way_there))
+    for _, nearest, way in sorted(planned, key=lambda one: one[:2]):
         yield refuges[nearest], way
 
 

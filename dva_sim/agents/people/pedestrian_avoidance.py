@@ -161,8 +161,8 @@ def doors_on(way: Floats, middles: Floats) -> list[Door]:
     gaps = np.hypot(*(way[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(way, axis=0).T))]
     near = np.flatnonzero(gaps.min(axis=1) < 0.5)
-    found = [Door(float(along[gaps[i].argmin()]), *middles[i].tolist()) for i in near]
-    return sorted(found, key=lambda door: door.along)
+    doors = [Door(float(along[gaps[i].argmin()]), *middles[i].tolist()) for i in near]
+    return sorted(doors, key=lambda door: door.along)
 
 
 class Courtesy:

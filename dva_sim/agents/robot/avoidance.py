@@ -147,9 +147,9 @@ class Avoidance:
         room = self.room_at(points.reshape(-1, 2)).reshape(points.shape[:2])
         needed = np.minimum(self.radius + LANE_ROOM, np.maximum(self.room_at(base), self.radius))
         needed = np.minimum(needed, room[:, :1] + STEP)  # who is too near already may get away
-        kept = room >= needed - 1e-9
-        kept[0] = True
-        return kept
+        keeps = room >= needed - 1e-9
+        keeps[0] = True
+        return keeps
 
     def _foreseen(self, way: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
         """Predict where others will be along one's path: `(2, others, n)` [m].

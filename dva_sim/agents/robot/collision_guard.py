@@ -68,7 +68,7 @@ def who_is_near(
         sees: Predicate: True if nothing stands between two places.
     """
     here = body.x, body.y
-    found = []
+    nearby = []
     for other, _ in world.neighbours(*here, within):
         if other is body:
             continue
@@ -77,12 +77,12 @@ def who_is_near(
         if sees(here, (x, y)):
             person = isinstance(other, PersonBody)
             kind, keep = ("person", PERSONAL) if person else ("robot", KEEP_ROBOT)
-            found.append(
+            nearby.append(
                 _make_nearby(
                     kind, other.name, x, y, *other.velocity, radius=other.radius, keep=keep
                 )
             )
-    return tuple(found)
+    return tuple(nearby)
 
 
 Floats = NDArray[np.float64]
@@ -173,10 +173,10 @@ class CollisionGuard:
         return reach if first >= len(way) else float(max(way[first] - STEP, 0.0))
 
 
-def _first(found: NDArray[np.bool_]) -> int:
+def _first(flags: NDArray[np.bool_]) -> int:
     """Return the place of the first true value; the length if there is none."""
-    at = int(found.argmax())
-    return at if found[at] else len(found)
+    at = int(flags.argmax())
+    return at if flags[at] else len(flags)
 
 
 def _arc(pose: tuple[float, float, float], curvature: float, way: Floats) -> Floats:

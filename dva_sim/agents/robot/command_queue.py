@@ -158,8 +158,8 @@ class FairQueue:
         lines: dict[Standing, LineOf] = {}
         for key, line in self._lines.items():
             standing = self._standing(line[0])
-            known = lines.setdefault(standing, key)
-            if standing is HOLDER and key[1] < known[1]:
+            first = lines.setdefault(standing, key)
+            if standing is HOLDER and key[1] < first[1]:
                 lines[standing] = key
         return lines
 

@@ -98,8 +98,8 @@ class Confirmations:
         if self._device.silent:  # its computer hangs, or has no power: it has not heard that
             self._failed()
             return
-        asked = self._inquiry.asked
-        of = self._waiting_for(asked) if asked is not None else []
+        question = self._inquiry.asked
+        of = self._waiting_for(question) if question is not None else []
         settled = [one for one in of if one.asked]
         if not self._decide(reply).waits:
             self._release(settled)

@@ -373,13 +373,13 @@ class RobotController:
         if isinstance(body.content, m.EmergencyRelease):
             self.latch.take_answer(body.content)
             return Decision(m.OK)
-        asked = self.inquiry.answered(body)
+        question = self.inquiry.answered(body)
         permission = body.content
-        if asked is None:
+        if question is None:
             return Decision(m.OK, waits=True)
         if body.code != m.OK or not isinstance(permission, m.Permission):
-            if asked.level is not None and asked.holder is not None:
-                self.observers.pop(asked.holder, None)
+            if question.level is not None and question.holder is not None:
+                self.observers.pop(question.holder, None)
             return Decision(m.OK)
         grant = m.PermissionGrant(
             permission.device,

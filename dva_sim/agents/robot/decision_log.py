@@ -129,14 +129,14 @@ def replay(
                     # absent before there was a latch
                     latch=EmergencyLatch(entry.get("release", DRIVE)),
                 )
-                asked = None
+                decision = None
             else:
-                asked = _again(controller, entry)
+                decision = _again(controller, entry)
         except _BROKEN as error:
             problem = f"is no line of a robot's trace: {_in_words(error)}"
             raise ConfigError(problem, path, number) from error
-        if asked is not None:
-            yield asked
+        if decision is not None:
+            yield decision
 
 
 _BROKEN = ValueError, KeyError, TypeError, RecursionError, ProtocolError

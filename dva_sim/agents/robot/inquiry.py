@@ -104,41 +104,41 @@ class Inquiry:
         It does not where the DVA must be asked again: it does not know the robot yet, or only
         questions about one device (before 1.6), or it may not have known that a session is over.
         """
-        asked = self.asked
+        question = self.asked
         self.asked = None
         by_name = self._by_name
         self._by_name = False
-        if asked is None:
+        if question is None:
             return None
         if reply.code in (m.BAD_MESSAGE, m.NOT_SUPPORTED):
-            self._by_name = not by_name and asked.level is None and self._claimed is not None
+            self._by_name = not by_name and question.level is None and self._claimed is not None
             if self._by_name:
                 self._holder = True
                 return None
         permission = reply.content
         overtaken = isinstance(permission, m.Permission) and self._was_over(permission.session)
         if overtaken or reply.code == m.NOT_REGISTERED:
-            self._again(asked)
+            self._again(question)
             return None
         if not self._holder:
             self._claimed = None
-        return asked
+        return question
 
     def unanswered(self) -> None:
         """Open the question under way again, since the DVA has not answered."""
-        asked = self.asked
+        question = self.asked
         self.asked = None
-        if asked is not None:
-            self._again(asked)
+        if question is not None:
+            self._again(question)
 
     def _was_over(self, session: int) -> bool:
         return session in self._over or len(self._over) > MOST_OVER
 
-    def _again(self, asked: m.GetGrant) -> None:
-        if asked.level is None:
+    def _again(self, question: m.GetGrant) -> None:
+        if question.level is None:
             self._holder = True
         else:
-            self.about_reader(asked.holder or "")
+            self.about_reader(question.holder or "")
 
     def _allowed(self, now: float) -> float:
         return min(BURST, self._left + RATE * (now - self._counted_at))

@@ -63,9 +63,9 @@ class CollisionGuardedDrive:
         self._wanted = TimedSetPoint(0.0, 0.0, 0.0)
         self._looking = False
 
-    def take(self, wanted: TimedSetPoint) -> None:
+    def take(self, set_point: TimedSetPoint) -> None:
         """Take a new set point: in force at once, and guarded until it expires."""
-        self._wanted = wanted
+        self._wanted = set_point
         if self._looking:
             self._apply()
         else:

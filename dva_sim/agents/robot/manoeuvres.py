@@ -250,12 +250,12 @@ class Inspection:
 
     def _in_view(self, seen: Sensed) -> SeenHazard | None:
         """Return the event, if it is in the picture."""
-        found = [
+        hazards = [
             h
             for h in seen.view.hazards
             if h.kind == self._event and math.dist((h.x, h.y), self._place) < MATCH_WITHIN
         ]
-        return min(found, key=lambda h: h.distance, default=None)
+        return min(hazards, key=lambda h: h.distance, default=None)
 
     def _face(self, seen: Sensed, place: Point) -> Intent:
         bearing = math.atan2(place[1] - seen.view.y, place[0] - seen.view.x)

@@ -113,10 +113,10 @@ def read_robot(document: Document) -> RobotProfile:
         ConfigError: it is not valid.
     """
     profile = validate(RobotProfile, document.data, document.error)
-    file, _, wanted = profile.drive.rpartition(":")
+    file, _, class_name = profile.drive.rpartition(":")
     beside = document.file.resolve().parent / file
-    if wanted and beside.is_file():
-        return profile.model_copy(update={"drive": f"{beside}:{wanted}"})
+    if class_name and beside.is_file():
+        return profile.model_copy(update={"drive": f"{beside}:{class_name}"})
     return profile
 
 

@@ -105,11 +105,11 @@ class SensorSubscriptions:
         if not SLOWEST <= wish.frequency <= fastest:
             return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {fastest:g} times a second"
         self._forget(now)
-        known = self._subscribed.get(key)
-        if known is None and len(self._subscribed) >= MOST:
+        subscription = self._subscribed.get(key)
+        if subscription is None and len(self._subscribed) >= MOST:
             return m.BUSY, f"{MOST} subscriptions are all that this robot serves"
         period = 1.0 / wish.frequency
-        due = now if known is None else min(known.due, now + period)
+        due = now if subscription is None else min(subscription.due, now + period)
         self._subscribed[key] = _Subscribed(period, now + LEASE, due)
         if not self._ticking:
             self._ticking = True
@@ -302,12 +302,14 @@ class RobotSensor:
         if sample == self._sample or (now >= self._stuck_at and self._shown):
             return self._shown
         self._sample = sample
-        shown = self._follow(np.array(self._source(now)), now)
+        sample_values = self._follow(np.array(self._source(now)), now)
         if self.kind.noise > 0.0:
-            shown = shown + self.kind.noise * self._normals(sample, len(shown))
+            sample_values = sample_values + self.kind.noise * self._normals(
+                sample, len(sample_values)
+            )
         kind = self.kind
         digits = max(0, math.ceil(-math.log10(kind.resolution)))
-        stepped = np.round(np.clip(shown, kind.low, kind.high) / kind.resolution)
+        stepped = np.round(np.clip(sample_values, kind.low, kind.high) / kind.resolution)
         self._shown = tuple((stepped * kind.resolution).round(digits).tolist())
         return self._shown
 

@@ -62,8 +62,8 @@ class AccelerometerPart(Config):
     def _one_noise(self) -> AccelerometerPart:
         density = self.noise_density_ug is not None, self.bandwidth_hz is not None
         if density[0] != density[1] or density[0] == (self.noise_mg is not None):
-            wanted = "noise_density_ug and bandwidth_hz, or noise_mg"
-            raise ValueError(f"noise should be given as {wanted}")
+            forms = "noise_density_ug and bandwidth_hz, or noise_mg"
+            raise ValueError(f"noise should be given as {forms}")
         for key in self.assumed:
             if key not in type(self).model_fields:
                 raise ValueError(f"assumed names {key!r}, which is not a key of a part")

@@ -98,11 +98,11 @@ class Trail:
 
     def sample(self, count: int, decay: float) -> None:
         """Take `count` samples; from each to the next the hand keeps the share `decay`."""
-        asked = self._asked
+        target = self._asked
         hand = self._hand
         add = self._filter.add
         for _ in range(count):
-            hand = asked + (hand - asked) * decay
+            hand = target + (hand - target) * decay
             add((hand, hand))
         self._hand = hand
 

@@ -295,8 +295,8 @@ def check_filter(filter_: Filter) -> None:
     batch = filter_.batch
     age = filter_.age
     if batch is not None and not (type(batch) is int and 1 <= batch <= MOST_BATCH):
-        wanted = f"None or a whole number, 1 to {MOST_BATCH}"
-        raise ConfigError(f"its batch is {batch!r}; should be {wanted}")
+        valid = f"None or a whole number, 1 to {MOST_BATCH}"
+        raise ConfigError(f"its batch is {batch!r}; should be {valid}")
     if not is_age(age):
         raise ConfigError(f"its age is {age!r}; should be a number of samples, at least 0")
 

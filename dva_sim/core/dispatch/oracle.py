@@ -119,15 +119,15 @@ class _Search:
         self, left: tuple[int, ...], free: tuple[float, ...], last: float
     ) -> list[tuple[float, int, int, float]]:
         """Response time, event, unit and start of all that could be sent next, after the last."""
-        found = []
+        branches = []
         for event in left:
             release = float(self.release[event])
             arrival = self.arrival[event].tolist()
             for unit, since in enumerate(free):
                 start = max(release, since)
                 if start >= last and arrival[unit] < _INF:
-                    found.append((start + arrival[unit] - release, event, unit, start))
-        return sorted(found)
+                    branches.append((start + arrival[unit] - release, event, unit, start))
+        return sorted(branches)
 
     def _bound(self, left: tuple[int, ...], free: tuple[float, ...], last: float) -> float:
         """Return a bound: no way to serve the rest has a smaller sum of response times.
@@ -148,10 +148,10 @@ class _Search:
 
     def _dominated(self, left: tuple[int, ...], state: tuple[float, ...]) -> bool:
         """Return True if the same events were served at no more cost, with no unit free later."""
-        known = self.seen.setdefault(left, [])
-        if any(all(a <= b for a, b in zip(old, state, strict=True)) for old in known):
+        states = self.seen.setdefault(left, [])
+        if any(all(a <= b for a, b in zip(old, state, strict=True)) for old in states):
             return True
-        known.append(state)
+        states.append(state)
         return False
 
 

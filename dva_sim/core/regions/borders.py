@@ -67,8 +67,8 @@ class Borders:
 
     def forget(self, device: str) -> None:
         """Forget a device that is not registered here any longer."""
-        for kept in (self._since, self._homes, self._asked, self.returning):
-            kept.pop(device, None)
+        for table in (self._since, self._homes, self._asked, self.returning):
+            table.pop(device, None)
         self.help.lent.discard(device)
 
     def _movable(self) -> list[DeviceEntry]:

@@ -74,13 +74,13 @@ class Division:
 
         Of two claims of one epoch that of the DVA earlier in the line holds.
         """
-        known = self.claims.get(region)
-        if known is None or claim.dva not in self.lines[region]:
+        newest = self.claims.get(region)
+        if newest is None or claim.dva not in self.lines[region]:
             return False
-        if claim.epoch >= known.epoch:
+        if claim.epoch >= newest.epoch:
             self.forgotten.discard(region)
         place = self.lines[region].index
-        is_higher = (claim.epoch, -place(claim.dva)) > (known.epoch, -place(known.dva))
+        is_higher = (claim.epoch, -place(claim.dva)) > (newest.epoch, -place(newest.dva))
         if is_higher:
             self.claims[region] = claim
         return is_higher

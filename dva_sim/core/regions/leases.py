@@ -27,14 +27,14 @@ class Leases:
 
     def bring(self, robot: str, body: m.GetGrant, session: int, now: float) -> None:
         """Let a permission hold that another DVA has given; later sessions are above it."""
-        known = self.sessions.permissions
-        if body.holder is None or body.level in (None, "sensors") or robot in known.grants:
+        permissions = self.sessions.permissions
+        if body.holder is None or body.level in (None, "sensors") or robot in permissions.grants:
             return
         is_over = self.sessions.has_unacknowledged(robot)
-        if is_over or not session or is_absurd(session, known.count << LOW_BITS):
+        if is_over or not session or is_absurd(session, permissions.count << LOW_BITS):
             return
-        known.count = max(known.count, session >> LOW_BITS)
-        known.restore(Grant(robot, body.holder, body.level, session))
+        permissions.count = max(permissions.count, session >> LOW_BITS)
+        permissions.restore(Grant(robot, body.holder, body.level, session))
         self._brought[session] = now
 
     def lapse(self, now: float) -> None:

@@ -206,8 +206,8 @@ class RegionalDva(Dva):
         """Let all open events be copied, where another DVA is the deputy than before."""
         registry = self.registry
         served = (region for region, _ in self.division.served())
-        found = {region: self.division.deputy_of(region, registry) for region in served}
-        deputies = {region: deputy for region, deputy in found.items() if deputy is not None}
+        chosen = {region: self.division.deputy_of(region, registry) for region in served}
+        deputies = {region: deputy for region, deputy in chosen.items() if deputy is not None}
         if deputies != self._deputies:
             self._deputies = deputies
             for event in self.events.open.values():
@@ -216,9 +216,9 @@ class RegionalDva(Dva):
     def _is_no_news(self, report: m.EventReport, now: float) -> bool:
         """Return True if somebody has found the same event here lately."""
         lately = (e for e in self.events.closed.values() if now - e.times["closed"] < NO_NEWS)
-        found = (e for e in lately if e.state in FOUND and e.kind == report.kind)
+        confirmed = (e for e in lately if e.state in FOUND and e.kind == report.kind)
         near = self.events.merge_distance
-        return any(apart(event.position, report.position) < near for event in found)
+        return any(apart(event.position, report.position) < near for event in confirmed)
 
     def _hears_of(self, peer: str, status: m.PeerStatus, now: float) -> list[Send]:
         entry = self.registry.heard(peer, now)
@@ -254,8 +254,8 @@ class RegionalDva(Dva):
     def _meet_stranger(self, robot: str, status: m.RobotStatus) -> None:
         """Keep a robot that acts under a session of another DVA from everybody until it is idle."""
         held = robot in self.sessions.permissions.grants
-        known = robot in self.registry.entries
-        if known and status.mode != "Idle" and not held:
+        is_registered = robot in self.registry.entries
+        if is_registered and status.mode != "Idle" and not held:
             self._strangers.add(robot)
             self.sessions.reserved.add(robot)
         elif robot in self._strangers:

@@ -31,18 +31,18 @@ class Returns:
 
     def ask(self, region: str) -> DvaAnswer:
         """Answer a supervisor; the own DVA of the region is asked if nobody acts there."""
-        known = self.division.claims.get(region)
-        if known is None:
+        claim = self.division.claims.get(region)
+        if claim is None:
             return DvaAnswer(m.NOT_SUPPORTED, f"no region {region!r} is known here")
         home = self.division.lines[region][0]
-        if known.dva != self.division.own or home == known.dva:
-            text = f"{region} is served by {self.orders.label_of(known.dva)}"
-            return DvaAnswer(m.OK if home == known.dva else m.NOT_PERMITTED, text)
+        if claim.dva != self.division.own or home == claim.dva:
+            text = f"{region} is served by {self.orders.label_of(claim.dva)}"
+            return DvaAnswer(m.OK if home == claim.dva else m.NOT_PERMITTED, text)
         if not self.division.is_there(home, self.orders.registry):
             return DvaAnswer(m.BUSY, f"{self.orders.label_of(home)} is not there")
         if (what := self._goes_on(region)) is not None:
             return DvaAnswer(m.BUSY, what)
-        return DvaAnswer(sends=[Send(home, m.GiveBack(region, known.epoch + 1))])
+        return DvaAnswer(sends=[Send(home, m.GiveBack(region, claim.epoch + 1))])
 
     def _goes_on(self, region: str) -> str | None:
         """Return what would be torn apart, or None."""
@@ -61,14 +61,14 @@ class Returns:
     def take(self, body: m.GiveBack) -> DvaAnswer:
         """Serve the own region again, as the DVA that has served it wants."""
         own = self.division.own
-        known = self.division.claims.get(body.region)
-        if known is None or body.epoch is None or self.division.lines[body.region][0] != own:
+        claim = self.division.claims.get(body.region)
+        if claim is None or body.epoch is None or self.division.lines[body.region][0] != own:
             return DvaAnswer(m.NOT_SUPPORTED, f"{body.region!r} is not the region of this DVA")
-        if body.epoch <= known.epoch and known != Claim(body.epoch, own):
-            return DvaAnswer(m.STALE, f"the epoch of {body.region} is {known.epoch}")
+        if body.epoch <= claim.epoch and claim != Claim(body.epoch, own):
+            return DvaAnswer(m.STALE, f"the epoch of {body.region} is {claim.epoch}")
         self.division.claims[body.region] = Claim(body.epoch, own)
         self.deputy.copies.pop(body.region, None)  # what is open is passed on
-        self.orders.counters["region taken back"] += known.dva != own
+        self.orders.counters["region taken back"] += claim.dva != own
         return DvaAnswer()
 
     def yielded(self, regions: list[str]) -> None:

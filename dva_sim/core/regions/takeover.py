@@ -51,23 +51,23 @@ class Deputy:
 
     def keep(self, peer: str, body: m.Replicate, now: float) -> DvaAnswer:
         """Keep a copy of an event, unless a newer claim to its region is known."""
-        known = self.division.claims.get(body.region)
-        if known is None:
+        claim = self.division.claims.get(body.region)
+        if claim is None:
             return DvaAnswer(m.NOT_SUPPORTED, f"no region {body.region!r} is known here")
-        if known == Claim(body.epoch, self.division.own):  # it returns what this DVA has forgotten
+        if claim == Claim(body.epoch, self.division.own):  # it returns what this DVA has forgotten
             self.copies.setdefault(body.region, {})[body.event.event_id] = Copy(body.event, now)
             self.taken_over[body.region] = now
             return DvaAnswer()
         self.division.learn(body.region, Claim(body.epoch, peer))
         if self.division.claims[body.region] != Claim(body.epoch, peer):
-            text = f"epoch {body.epoch} of {body.region} is over: it is {known.epoch}"
+            text = f"epoch {body.epoch} of {body.region} is over: it is {claim.epoch}"
             return DvaAnswer(m.STALE, text)
-        kept = self.copies.setdefault(body.region, {})
+        copies = self.copies.setdefault(body.region, {})
         number = body.event.event_id
         if body.event.closed_for is not None:
-            kept.pop(number, None)
-        elif number in kept or len(kept) < MOST_COPIES:
-            kept[number] = Copy(body.event, now)
+            copies.pop(number, None)
+        elif number in copies or len(copies) < MOST_COPIES:
+            copies[number] = Copy(body.event, now)
         return DvaAnswer()
 
     def return_copies(self, peer: str, now: float) -> list[Send]:
@@ -164,13 +164,13 @@ class Deputy:
     def resume(self, now: float) -> None:
         """Go on with the copied events of regions that were taken over."""
         for region, since in self.taken_over.items():
-            kept = self.copies.get(region, {})
-            for number, copy in list(kept.items()):
+            copies = self.copies.get(region, {})
+            for number, copy in list(copies.items()):
                 sent = self._sent(copy.status)
                 there = all(self._is_there(device) for device in sent)
                 there = there and copy.status.responder not in self.orders.engaged
                 if there or now - since >= COME_WITHIN:
-                    del kept[number]
+                    del copies[number]
                     self._go_on(copy, there, now)
 
     @staticmethod

@@ -251,10 +251,10 @@ def _differences(losses: Floats) -> tuple[Floats, Floats, Floats]:
     mean, low, high = np.full((3, count, count, models), np.nan)
     one, other = np.triu_indices(count, 1)
     pairs = losses[one] - losses[other]
-    found = band(person_means(pairs.reshape(-1, *losses.shape[2:])))
-    alike = (found.n_persons > 1) & ~np.isfinite(found.low)  # all persons differ by the same
-    ends = (np.where(alike, found.mean, edge) for edge in (found.low, found.high))
-    means, lows, highs = (x.reshape(-1, models) for x in (found.mean, *ends))
+    bands = band(person_means(pairs.reshape(-1, *losses.shape[2:])))
+    alike = (bands.n_persons > 1) & ~np.isfinite(bands.low)  # all persons differ by the same
+    ends = (np.where(alike, bands.mean, edge) for edge in (bands.low, bands.high))
+    means, lows, highs = (x.reshape(-1, models) for x in (bands.mean, *ends))
     mean[one, other] = means
     low[one, other] = lows
     high[one, other] = highs

@@ -35,12 +35,12 @@ class Comparison(MatchedResults):
         """
         self.refuse_distrusted()
         table, column = self.find(measure)
-        found = []
+        rows_by_group = []
         for group in self.groups(by):
             rows = [as_numbers(self.rows(side, table, column, group), column) for side in (0, 1)]
             if any(np.isfinite(side.values).any() for side in rows):
-                found.append(difference(group.part, group.levels, *rows))
-        return found
+                rows_by_group.append(difference(group.part, group.levels, *rows))
+        return rows_by_group
 
     def judge(self, fail_if: str) -> list[GateVerdict]:
         """Look at a condition such as `p95(response_s) > 1.05x`, part by part.

@@ -95,9 +95,9 @@ class Endings:
     def under(self, line: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
         """Select the events under these levels; other factors as in the answer `(n,)`."""
         view = self._view
-        wanted: Setting = dict(view.panels[0] if panel is None else panel)
-        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
-        return self._grid.at(wanted)
+        setting: Setting = dict(view.panels[0] if panel is None else panel)
+        setting |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        return self._grid.at(setting)
 
     def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Return shares by the horizon, each with its 95 % interval over persons."""
@@ -106,9 +106,11 @@ class Endings:
         time = self.time[mask]
         person = self._person[mask]
         causes = list(np.where(way == NOTHING, "", way))
-        found = cumulative_incidence(time, causes, self.horizon, person)
+        incidence = cumulative_incidence(time, causes, self.horizon, person)
         never = share_interval(np.zeros(len(person)), person)
-        shares = {w: found.causes.get(w, never) for w in self.ways} | {NOTHING: found.nothing}
+        shares = {w: incidence.causes.get(w, never) for w in self.ways} | {
+            NOTHING: incidence.nothing
+        }
         return Ended(line, stop, len(person), shares)
 
     def difference(self, first: Level, second: Level, stop: Level) -> Interval:
@@ -186,5 +188,5 @@ def _how_drives_ended(rows: Table, runs: Table) -> NDArray[np.str_]:
     if len(set(addresses)) < len(addresses):
         return nothing
     ends = [_OF_DRIVES.get(str(word), "") for word in runs["outcome"]]
-    known = dict(zip(Address.all_of(runs), ends, strict=True))
-    return np.array([known.get(address, "") for address in addresses], dtype="U24")
+    end_by_address = dict(zip(Address.all_of(runs), ends, strict=True))
+    return np.array([end_by_address.get(address, "") for address in addresses], dtype="U24")

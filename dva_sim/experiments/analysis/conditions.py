@@ -37,8 +37,8 @@ def conditions(
     stated = stated_conditions(dict.fromkeys(s.get("model", "full") for s in scenarios.values()))
     stated |= {key: factor_name(key) for key in also if key not in stated}
     for key, name in stated.items():
-        found = [get(s, key) for s in scenarios.values()]
-        values = [None if v is False or v == [] else v for v in found]  # which go without saying
+        settings = [get(s, key) for s in scenarios.values()]
+        values = [None if v is False or v == [] else v for v in settings]  # which go without saying
         if key in varied:
             rows.append((name, [_VARIED] * len(values)))
         elif any(v is not None for v in values):
@@ -102,8 +102,8 @@ def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> Request
 
 def _usual(of: Callable[[str], Any]) -> float | None:
     """Return the time-out where nobody gives one [s]; None where that cannot be known."""
-    known = of("link.delay_s") is not None and of("robot.processing_s") is not None
-    return time_out_s(_needed(of)[1]) if known else None
+    is_timed = of("link.delay_s") is not None and of("robot.processing_s") is not None
+    return time_out_s(_needed(of)[1]) if is_timed else None
 
 
 def _needed(of: Callable[[str], Any]) -> tuple[float, float]:

@@ -114,12 +114,12 @@ class _Reader:
         left = self.word
         rest = self.text[self._at :]
         self._begin = self._at + len(rest) - len(rest.lstrip())
-        found = _WORD.match(rest)
-        if found is None and rest.strip():
+        match = _WORD.match(rest)
+        if match is None and rest.strip():
             raise self.error(f"{rest.strip()[0]!r} has no meaning here")
-        self.kind = str(found.lastgroup) if found else "end"
-        self.word = found[self.kind] if found else ""
-        self._at += found.end() if found else 0
+        self.kind = str(match.lastgroup) if match else "end"
+        self.word = match[self.kind] if match else ""
+        self._at += match.end() if match else 0
         return left
 
     def take(self, kind: str, among: tuple[str, ...] = (), called: str = "") -> str:
@@ -129,8 +129,8 @@ class _Reader:
             ConfigError: it is not.
         """
         if self.kind != kind or (among and self.word not in among):
-            found = f"not {self.word!r}" if self.word else "and then it ends"
-            raise self.error(f"expected {called or ' or '.join(map(repr, among))}, {found}")
+            next_word = f"not {self.word!r}" if self.word else "and then it ends"
+            raise self.error(f"expected {called or ' or '.join(map(repr, among))}, {next_word}")
         return self.next()
 
     def error(self, problem: str) -> ConfigError:
@@ -173,8 +173,8 @@ def parse(text: str) -> Gate:
 
 def percent_of(statistic: str) -> float | None:
     """Parse a percentile's name: 95 for `p95`; None for other statistics."""
-    found = re.fullmatch(r"p(\d\d?(?:\.\d+)?)", statistic)
-    return float(found[1]) if found and float(found[1]) else None
+    match = re.fullmatch(r"p(\d\d?(?:\.\d+)?)", statistic)
+    return float(match[1]) if match and float(match[1]) else None
 
 
 def _test(words: _Reader, measure: str) -> Test | None:
@@ -202,8 +202,8 @@ def _scaled(text: str, words: _Reader, unit: str) -> float:
         return float(text)
     scales = {unit: "1"} | _SCALES.get(unit, {})
     if words.word not in scales:
-        known = ", ".join(name for name in scales if name) or "none"
-        raise words.error(f"unit {words.word!r} does not fit; units: {known}")
+        units = ", ".join(name for name in scales if name) or "none"
+        raise words.error(f"unit {words.word!r} does not fit; units: {units}")
     return float(Decimal(text) * Decimal(scales[words.next()]))  # 95 % is 0.95 to the last bit
 
 
@@ -273,10 +273,10 @@ def _verdicts(
         if not any(len(_values(gate, side)) for side in sides):
             continue
         shares = [_missing(side, len(runs)) for side, runs in zip(sides, crashed, strict=True)]
-        found = shares
+        measured = shares
         if gate.statistic != "missing":
-            found = [_computed(gate, side) for side in _both(gate, *sides)]
-        first, second = found
+            measured = [_computed(gate, side) for side in _both(gate, *sides)]
+        first, second = measured
         _refuse_undecided(gate, group, first, second)
         bound = gate.bound.for_(first)
         yield GateVerdict(

@@ -176,8 +176,8 @@ def pairs_of(
 ) -> PairedRuns | None:
     """Return both sides of a contrast at one place; None where it was not run."""
     part = part_of(study, runs, contrast.part)
-    wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
-    if not all(level in part.levels.get(name, ()) for name, level in wanted):
+    needed = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
+    if not all(level in part.levels.get(name, ()) for name, level in needed):
         return None
     grid = part.outcome(contrast.measure)
     sides = [part.where(grid, dict(at) | {contrast.factor: level}) for level in contrast.contrast]
@@ -216,14 +216,14 @@ def _compared(
     study: Mapping[str, Any], runs: Table, name: str, contrast: Contrast, at: Setting
 ) -> Compared:
     pairs = pairs_of(study, runs, contrast, at)
-    found = paired_difference(*pairs) if pairs is not None else None
-    if pairs is None or found is None or not found.n_persons:
+    difference = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or difference is None or not difference.n_persons:
         return Compared(name, contrast, at)
     return Compared(
         name=name,
         contrast=contrast,
         at=at,
-        difference=found,
+        difference=difference,
         size=effect_size(*pairs),
         correlation=pair_correlation(pairs.first, pairs.second),
         p=permutation_test(*pairs),
@@ -235,12 +235,12 @@ def _tested(
 ) -> Tested:
     at = places_of(study, contrast)[-1] | claim.at
     pairs = pairs_of(study, runs, contrast, at)
-    found = paired_difference(*pairs) if pairs is not None else None
-    if pairs is None or found is None or not found.n_persons:
+    difference = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or difference is None or not difference.n_persons:
         return Tested(name, claim, contrast, at)
     p = _p(claim, pairs)
     against = _p_against(claim, pairs)
-    return Tested(name, claim, contrast, at, found, p=p, p_against=against)
+    return Tested(name, claim, contrast, at, difference, p=p, p_against=against)
 
 
 def _p(claim: Hypothesis, pairs: PairedRuns) -> float:

@@ -90,8 +90,8 @@ def match(first: Results, second: Results) -> Matched:
 
 def _cells(results: Results) -> _Cells:
     cells = results.manifest.get("cells", [])
-    kept = (c for c in cells if c["part"] != REPEATS and c["cell"] != REFERENCE)
-    return {Address.of(cell): cell for cell in kept}
+    own_cells = (c for c in cells if c["part"] != REPEATS and c["cell"] != REFERENCE)
+    return {Address.of(cell): cell for cell in own_cells}
 
 
 def _levels(cells: _Cells, factor: str) -> tuple[Level, ...]:
@@ -149,8 +149,8 @@ class Rows:
         """Return the mean of the rows of each run that has a value."""
         runs = sorted(set(self.runs))
         number = {run: n for n, run in enumerate(runs)}
-        found, means = person_means(self.values, [number[run] for run in self.runs])
-        return dict(zip((runs[n] for n in found.astype(int)), means.tolist(), strict=True))
+        numbers, means = person_means(self.values, [number[run] for run in self.runs])
+        return dict(zip((runs[n] for n in numbers.astype(int)), means.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -241,8 +241,8 @@ def _unpaired(a: Mapping[Run, float], b: Mapping[Run, float]) -> Interval:
     n = min(len(old), len(new))
     if n < 2:
         return Interval(mean, np.nan, np.nan, n)
-    found = stats.ttest_ind(new, old, equal_var=False).confidence_interval(LEVEL)
-    return Interval(mean, float(found.low), float(found.high), n)
+    interval = stats.ttest_ind(new, old, equal_var=False).confidence_interval(LEVEL)
+    return Interval(mean, float(interval.low), float(interval.high), n)
 
 
 @dataclass(frozen=True)
@@ -295,12 +295,12 @@ class MatchedResults:
         """Measurable columns that both folders have, by table, the runs first."""
         first, second = self.sides
         tables = [name for name in first.tables if second.has(name)]
-        known = {*DESIGN, *first.factors, *second.factors}
-        found = {}
+        keys = {*DESIGN, *first.factors, *second.factors}
+        columns = {}
         for table in sorted(tables, key=lambda name: name != "runs"):
-            both = set(second.names(table)) - known
-            found[table] = [name for name in first.names(table) if name in both]
-        return found
+            both = set(second.names(table)) - keys
+            columns[table] = [name for name in first.names(table) if name in both]
+        return columns
 
     def find(self, measure: str | None = None) -> tuple[str, str]:
         """Return the table and column of a measure: `drive_time_s`, or `events.response_s`.
@@ -335,9 +335,9 @@ class MatchedResults:
         Raises:
             ConfigError: a factor that the cells do not have in common.
         """
-        known = dict.fromkeys(name for pair in self.matched.pairs for name, _ in pair.levels)
-        if unknown := [name for name in by or () if name not in known]:
-            suggestion = hint(unknown[0], known, "common")
+        common = dict.fromkeys(name for pair in self.matched.pairs for name, _ in pair.levels)
+        if unknown := [name for name in by or () if name not in common]:
+            suggestion = hint(unknown[0], common, "common")
             raise ConfigError(f"factor {unknown[0]!r} is not common to both; {suggestion}")
         groups: dict[tuple[str, Levels, int], list[Pair]] = {}
         for pair in self.matched.pairs:

@@ -53,27 +53,29 @@ class Judged:
 
 def judge_all(study: Mapping[str, Any], view: StudyView | None) -> list[Judged]:
     """Return every prediction of a study, as its manifest holds it."""
-    found = [Prediction.model_validate(p) for p in study.get("predictions") or ()]
-    return [_judge(prediction, view) for prediction in found]
+    predictions = [Prediction.model_validate(p) for p in study.get("predictions") or ()]
+    return [_judge(prediction, view) for prediction in predictions]
 
 
 def verdict_of(
-    direction: str | None, expected: Range | None, smallest: float | None, found: Interval
+    direction: str | None, expected: Range | None, smallest: float | None, interval: Interval
 ) -> Verdict:
     """Judge a prediction by the interval of the finding."""
     least = min(map(abs, expected)) if expected is not None else math.inf
-    verdicts = [_of_direction(direction, smallest, found, is_small=least < (smallest or 0.0))]
+    verdicts = [_of_direction(direction, smallest, interval, is_small=least < (smallest or 0.0))]
     if expected is not None:
-        verdicts.append(_of_range(expected, found))
+        verdicts.append(_of_range(expected, interval))
     if "did not hold" in verdicts:
         return "did not hold"
     return "held" if all(v == "held" for v in verdicts) else "open"
 
 
 def _of_direction(
-    direction: str | None, smallest: float | None, found: Interval, is_small: bool
+    direction: str | None, smallest: float | None, interval: Interval, is_small: bool
 ) -> Verdict:
-    low, high = (found.low, found.high) if direction != "below" else (-found.high, -found.low)
+    low, high = (
+        (interval.low, interval.high) if direction != "below" else (-interval.high, -interval.low)
+    )
     matters = smallest or 0.0
     if direction == "same":
         if -matters <= low and high <= matters:
@@ -84,10 +86,10 @@ def _of_direction(
     return "did not hold" if high <= 0 or (high < matters and not is_small) else "open"
 
 
-def _of_range(expected: Range, found: Interval) -> Verdict:
-    if expected[0] <= found.mean <= expected[1]:
+def _of_range(expected: Range, interval: Interval) -> Verdict:
+    if expected[0] <= interval.mean <= expected[1]:
         return "held"
-    apart = found.low > expected[1] or found.high < expected[0]
+    apart = interval.low > expected[1] or interval.high < expected[0]
     return "did not hold" if apart else "open"
 
 
@@ -95,10 +97,10 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     text = prediction.text
     if prediction.direction is None:
         return Judged(text, "", "", "not judged")
-    asked = _asked(prediction, view) if view is not None else None
-    if view is None or asked is None:
+    question = _asked(prediction, view) if view is not None else None
+    if view is None or question is None:
         return Judged(text, "", "not run", "not judged")
-    factor, (first, second), where = asked
+    factor, (first, second), where = question
     unit = unit_of(view.measure)
     names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
     expected = f"{names} in {measure_of(view.measure, view.part.name)}, {setting(where)}: "
@@ -107,14 +109,14 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
         expected += f", {number(range_[0])} to {quantity(range_[1], unit)}"
     if factor == TUNING and _chose_what_was(view, (first, second), where):
         return Judged(text, expected, _SAME_RUNS, "not judged")
-    found = _measured(view, factor, (first, second), where)
-    if found is None:
+    interval = _measured(view, factor, (first, second), where)
+    if interval is None:
         return Judged(text, expected, "not run", "not judged")
-    verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, found)
-    low = max(found.low, -view.widest)
-    high = min(found.high, view.widest)
-    words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
-    return Judged(text, expected, words, verdict, found.n_persons)
+    verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, interval)
+    low = max(interval.low, -view.widest)
+    high = min(interval.high, view.widest)
+    words = f"{quantity(interval.mean, unit)} ({number(low)} to {quantity(high, unit)})"
+    return Judged(text, expected, words, verdict, interval.n_persons)
 
 
 def _asked(
@@ -131,11 +133,11 @@ def _asked(
     if factor != view.line.name and view.contrast is not None:
         where.setdefault(view.line.name, view.contrast[1])
     where.pop(factor, None)
-    wanted: list[tuple[str, Sequence[Level]]] = [(name, (level,)) for name, level in where.items()]
+    needed: list[tuple[str, Sequence[Level]]] = [(name, (level,)) for name, level in where.items()]
     if contrast is None or factor not in levels:
         return None
-    wanted.append((factor, contrast))
-    ran = all(name in levels and set(some) <= set(levels[name]) for name, some in wanted)
+    needed.append((factor, contrast))
+    ran = all(name in levels and set(some) <= set(levels[name]) for name, some in needed)
     return (factor, contrast, where) if ran else None
 
 
@@ -151,5 +153,5 @@ def _measured(
 ) -> Interval | None:
     """Return the paired difference at one place."""
     first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)
-    found = interval_of(first - second, view.level)
-    return found if found is not None and found.n_persons > 1 else None
+    interval = interval_of(first - second, view.level)
+    return interval if interval is not None and interval.n_persons > 1 else None

@@ -108,10 +108,10 @@ def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
     return np.where(_has(part, "move_and_wait", own), 1.0, np.zeros(delays.shape))
 
 
-def _watched(delays: Floats, known: Sequence[tuple[float, float]]) -> Marks:
+def _watched(delays: Floats, bands: Sequence[tuple[float, float]]) -> Marks:
     """Mark the delays that lie within any of the ranges."""
     watched = np.zeros(delays.shape, dtype=bool)
-    for low, high in known:
+    for low, high in bands:
         watched |= (delays >= low) & (delays <= high)
     return watched
 
@@ -124,8 +124,8 @@ def _has(part: RunGrid, strategy: str, own: str) -> Marks:
 
 def _coverage(strategy: str) -> str:
     lines = [
-        f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
-        for known in supports_of(strategy)
+        f"{support.low_s:g} to {support.high_s:g} s, {' '.join(support.why.split())}"
+        for support in supports_of(strategy)
     ]
     return f"{strategy}: {', and '.join(lines) or 'no published data'}"
 
@@ -335,15 +335,17 @@ def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
     """Return the paired difference under one model; the reference run drops out of it."""
     own = read.own(where)
     difference = read.difference(where)
-    found = interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
-    if found is None:
+    interval = (
+        interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
+    )
+    if interval is None:
         return None
     return Repeat(
         strategy=str(where.get(STRATEGY, "")),
         parameters=int(str(where[PARAMETERS])),
-        mean=found.mean,
-        low=found.low,
-        high=found.high,
+        mean=interval.mean,
+        low=interval.low,
+        high=interval.high,
         is_own=read.is_own(where),
         is_beyond=read.is_beyond(where),
     )

@@ -66,8 +66,8 @@ class RunGrid:
         self.treated = {key: np.asarray(values)[here & ~aside] for key, values in table.items()}
         self.references = {key: np.asarray(values)[here & aside] for key, values in table.items()}
         codes = [codes_of(self.treated, f) for f in self.factors]
-        known = np.all([c >= 0 for c in codes], axis=0) if codes else np.True_
-        self._known = np.broadcast_to(known, len(self.treated["person"]))
+        has_cell = np.all([c >= 0 for c in codes], axis=0) if codes else np.True_
+        self._known = np.broadcast_to(has_cell, len(self.treated["person"]))
         self._index = (*codes, *self._who(self.treated))
 
     def _who(self, rows: Table) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

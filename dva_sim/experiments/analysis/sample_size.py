@@ -194,50 +194,50 @@ def _of_answer(view: StudyView | None, in_any_case: bool) -> Iterator[_Test]:
     if view is None or view.contrast is None or view.line is None:
         return
     differences = view.difference(view.panels[0], *view.contrast)
-    found = band(differences, view.level)
+    bands = band(differences, view.level)
     smallest = view.smallest_effect
-    is_judged = np.isfinite(found.critical)
+    is_judged = np.isfinite(bands.critical)
     if not is_judged.any():
         return
-    holds_zero = (found.low <= 0) & (found.high >= 0)
-    bounds = np.maximum(-found.low, found.high)
+    holds_zero = (bands.low <= 0) & (bands.high >= 0)
+    bounds = np.maximum(-bands.low, bands.high)
     is_open = is_judged & holds_zero & (bounds > (smallest or 0.0))
-    largest = int(np.where(is_judged, abs(found.mean), -1.0).argmax())
-    effect = abs(float(found.mean[largest]))
+    largest = int(np.where(is_judged, abs(bands.mean), -1.0).argmax())
+    effect = abs(float(bands.mean[largest]))
     if (is_open[largest] or in_any_case) and effect > (smallest or 0.0):
-        yield _to_settle(view, found, differences, (largest, effect, "the largest found"))
+        yield _to_settle(view, bands, differences, (largest, effect, "the largest found"))
     if smallest is not None and (is_open.any() or in_any_case):
         stops = np.flatnonzero(is_open) if is_open.any() else [largest]
-        wanted = [(int(stop), smallest, "the smallest that matters") for stop in stops]
-        tests = [_to_settle(view, found, differences, each) for each in wanted]
+        aims = [(int(stop), smallest, "the smallest that matters") for stop in stops]
+        tests = [_to_settle(view, bands, differences, each) for each in aims]
         yield max(tests, key=lambda test: _plan(test).counts[0].persons)
 
 
 def _to_settle(
-    view: StudyView, found: Band, differences: Floats, asked: tuple[int, float, str]
+    view: StudyView, bands: Band, differences: Floats, aim: tuple[int, float, str]
 ) -> _Test:
     """Return the test that shows a difference at a stop not to be zero.
 
     Args:
         view: View of the study.
-        found: Its differences at all stops, with their band.
+        bands: Its differences at all stops, with their band.
         differences: Differences of persons `(persons, stops)`.
-        asked: The stop, the true difference that is assumed, and what that is in words.
+        aim: The stop, the true difference that is assumed, and what that is in words.
     """
-    stop, effect, why = asked
-    mean = float(found.mean[stop])
-    reach = float(found.high[stop]) - mean if mean < 0 else mean - float(found.low[stop])
-    each = 1 - (1 - view.level) / int(np.isfinite(found.critical).sum())
+    stop, effect, why = aim
+    mean = float(bands.mean[stop])
+    reach = float(bands.high[stop]) - mean if mean < 0 else mean - float(bands.low[stop])
+    each = 1 - (1 - view.level) / int(np.isfinite(bands.critical).sum())
     law = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
     assert law is not None  # there is a band
     assumed = f"{quantity(effect, unit_of(view.measure))}, {why}"
     return _Test(ANSWER, f"{_sides_of(view, stop)}: not zero", assumed, law, effect)
 
 
-def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
+def _assumed(largest: float, smallest: float | None) -> Iterator[tuple[float, str]]:
     """Yield true differences that one may count on: that found, if it matters, and the smallest."""
-    if found > (smallest or 0.0):
-        yield found, "the largest found"
+    if largest > (smallest or 0.0):
+        yield largest, "the largest found"
     if smallest is not None:
         yield smallest, "the smallest that matters"
 
@@ -255,12 +255,12 @@ def _of_claims(
         level = 1 - 2 * _ALPHA / family[contrast.family]  # one-sided
         if (pairs := pairs_of(study, runs, contrast, at)) is None:
             continue
-        found = _interval(pairs, level)
+        interval = _interval(pairs, level)
         unit = unit_of(contrast.measure)
-        mean = found.mean
+        mean = interval.mean
         is_same = claim.direction == "same"
         side = -1 if claim.direction == "below" else 1
-        ends = {-1: found.high - mean, 1: mean - found.low}
+        ends = {-1: interval.high - mean, 1: mean - interval.low}
         law = _law(pairs, max(ends.values()) if is_same else ends[side], level)
         distance = claim.margin - abs(mean) if is_same else side * mean - claim.margin
         what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
@@ -282,17 +282,17 @@ def _of_comparisons(
         differences = [
             (_interval(pairs, 1 - alpha), pairs, at) for at, pairs in places if pairs is not None
         ]
-        known = [each for each in differences if math.isfinite(each[0].mean)]
-        if not known:
+        finite = [each for each in differences if math.isfinite(each[0].mean)]
+        if not finite:
             continue
-        found, pairs, at = max(known, key=lambda each: abs(each[0].mean))
+        interval, pairs, at = max(finite, key=lambda each: abs(each[0].mean))
         unit = unit_of(contrast.measure)
-        reach = found.mean - found.low if found.mean > 0 else found.high - found.mean
+        reach = interval.mean - interval.low if interval.mean > 0 else interval.high - interval.mean
         if (law := _law(pairs, reach, 1 - alpha)) is None:
             continue
         what = f"{_sides(contrast, at)}: not zero"
         least = math.ceil(math.log2(2 / alpha))  # 2 in 2 ** n ways to swap labels are as far off
-        for effect, why in _assumed(abs(found.mean), contrast.smallest):
+        for effect, why in _assumed(abs(interval.mean), contrast.smallest):
             assumed = f"{quantity(effect, unit)}, {why}"
             yield _Test(name, what, assumed, law, effect, least=least)
 
@@ -313,33 +313,33 @@ def _plan(test: _Test) -> SizePlan:
         missed = [1 - law.power(d, persons) for d in (test.distance, test.other) if d < math.inf]
         return 1 - sum(missed)
 
-    wanted = POWERS if test.distance > 0 else ()
-    counts = tuple(_count(chance, share, law.persons, test.least) for share in wanted)
+    powers = POWERS if test.distance > 0 else ()
+    counts = tuple(_count(chance, share, law.persons, test.least) for share in powers)
     return SizePlan(test.name, test.what, test.assumed, law.persons, counts)
 
 
-def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
+def _count(chance: Callable[[int], float], power: float, persons_so_far: int, least: int) -> Count:
     """Return the fewest persons with such a chance, and how far a few leave it open."""
-    persons = _fewest(chance, wanted)
-    freedom = known - 1
+    persons = _fewest(chance, power)
+    freedom = persons_so_far - 1
     # The sum of squares over the true variance is chi-squared; persons go with the variance.
     low, high = (freedom / special.chdtri(freedom, tail) for tail in (0.025, 0.975))
     counts = (max(count, least) for count in (persons, persons * low, persons * high))
     return Count(*(math.inf if count > MOST_PERSONS else math.ceil(count) for count in counts))
 
 
-def _fewest(chance: Callable[[int], float], wanted: float) -> float:
+def _fewest(chance: Callable[[int], float], power: float) -> float:
     """Return the fewest, by doubling, then by halves; infinite beyond `MOST_PERSONS`."""
     low = 1
     high = 2
-    while chance(high) < wanted:
+    while chance(high) < power:
         if high > MOST_PERSONS:
             return math.inf
         low = high
         high = 2 * high
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if chance(middle) >= wanted else (middle, high)
+        low, high = (low, middle) if chance(middle) >= power else (middle, high)
     return high
 
 

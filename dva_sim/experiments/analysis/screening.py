@@ -50,10 +50,10 @@ class Screening:
             table = csv.writer(file, lineterminator="\n")
             names = "key,default,low,high,unit,size,mean,mean_low,mean_high,spread"
             table.writerow(names.split(","))
-            for each, found in self.numbers:
+            for each, effect in self.numbers:
                 about = each.key, each.default, each.low, each.high, each.unit
-                ends = found.mean.mean, found.mean.low, found.mean.high
-                effects = [f"{value:.6g}" for value in (found.size, *ends, found.spread)]
+                ends = effect.mean.mean, effect.mean.low, effect.mean.high
+                effects = [f"{value:.6g}" for value in (effect.size, *ends, effect.spread)]
                 table.writerow([*about, *effects])
         return path
 

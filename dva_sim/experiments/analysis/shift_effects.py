@@ -57,8 +57,8 @@ class Shifts:
     @property
     def follow(self) -> float:
         """For how long each event was followed [s]."""
-        found = self.of("follow_s")
-        return float(np.nanmax(found)) if np.isfinite(found).any() else FOLLOW_S
+        times = self.of("follow_s")
+        return float(np.nanmax(times)) if np.isfinite(times).any() else FOLLOW_S
 
     def of(self, column: str) -> Floats:
         """Return values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
@@ -164,20 +164,20 @@ def pooled(
     order = np.argsort(response, kind="stable")
     ranked = response[order]
     owner = owner[order]
-    wanted = np.asarray(quantiles)
+    levels = np.asarray(quantiles)
     if not len(ranked):
-        return (np.full(len(wanted), np.nan),) * 3
-    value = _crossed(ranked, np.ones((1, len(ranked))), wanted)[0]
+        return (np.full(len(levels), np.nan),) * 3
+    value = _crossed(ranked, np.ones((1, len(ranked))), levels)[0]
     rng = np.random.Generator(np.random.PCG64(1))
     drawn = rng.multinomial(len(shifts), np.full(len(shifts), 1 / len(shifts)), size=RESAMPLES)
-    found = _crossed(ranked, drawn[:, owner].astype(float), wanted)
+    crossings = _crossed(ranked, drawn[:, owner].astype(float), levels)
     edges = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
-    low, high = np.quantile(found, edges, axis=0, method="inverted_cdf")
+    low, high = np.quantile(crossings, edges, axis=0, method="inverted_cdf")
     return value, low, high
 
 
-def _crossed(ranked: Floats, weights: Floats, wanted: Floats) -> Floats:
+def _crossed(ranked: Floats, weights: Floats, levels: Floats) -> Floats:
     """Return the first value by which a share of the weight `(b, n)` is reached, `(b, q)`."""
     upto = np.cumsum(weights, axis=1)
-    places = [(upto >= q * upto[:, -1:] - 1e-9).argmax(axis=1) for q in wanted]
+    places = [(upto >= q * upto[:, -1:] - 1e-9).argmax(axis=1) for q in levels]
     return np.stack([ranked[place] for place in places], axis=1)

@@ -25,8 +25,8 @@ def widest(study: Study, stop: StopRule, runs: Table) -> float:
     Args:
         runs: The table of runs so far.
     """
-    found = half_widths(study, stop, runs)
-    return float(found.max()) if len(found) and np.isfinite(found).all() else math.inf
+    widths = half_widths(study, stop, runs)
+    return float(widths.max()) if len(widths) and np.isfinite(widths).all() else math.inf
 
 
 def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
@@ -41,36 +41,36 @@ def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
     return _of_contrast(study, study.contrasts[stop.comparison], runs, stop.level(study.persons))
 
 
-def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Floats:
+def _of_contrast(study: Study, contrast: Contrast, runs: Table, level: float) -> Floats:
     """Return half-widths of the paired difference at each level of `over`; references cancel.
 
     The answer's is adjusted for the covariates. Factors that it does not name are at their first
     level, but for those of rows, which are averaged.
     """
-    sides_at = {asked.factor, asked.over}
+    sides_at = {contrast.factor, contrast.over}
     together = (study.design.zip or ())[1:] if study.design is not None else ()
-    alike = {*together} - {*sides_at, *asked.within}  # as the first that is taken with them
+    alike = {*together} - {*sides_at, *contrast.within}  # as the first that is taken with them
     factors = [Factor(*each) for each in study.factors.items() if each[0] not in alike]
-    part = RunGrid(runs, asked.part, factors)
+    part = RunGrid(runs, contrast.part, factors)
     free = sides_at | factors_in_rows(study)
     fixed = {f: levels[0] for f, levels in part.levels.items() if f not in free}
-    fixed |= asked.within
-    axes = [name for name in part.levels if name not in (*fixed, asked.factor)]
-    over = axes.index(asked.over) if asked.over is not None else None
+    fixed |= contrast.within
+    axes = [name for name in part.levels if name not in (*fixed, contrast.factor)]
+    over = axes.index(contrast.over) if contrast.over is not None else None
 
     def sides(grid: Floats) -> list[Floats]:
         """Return the first and second, `(stops, persons, trials)` each."""
-        found = []
-        for side in asked.contrast:
-            values = part.where(grid, fixed | {asked.factor: side})
+        grids = []
+        for side in contrast.contrast:
+            values = part.where(grid, fixed | {contrast.factor: side})
             stops = values[np.newaxis] if over is None else np.moveaxis(values, over, 0)
             by_person = np.moveaxis(stops, -2, 1)
-            found.append(by_person.reshape(*by_person.shape[:2], -1))
-        return found
+            grids.append(by_person.reshape(*by_person.shape[:2], -1))
+        return grids
 
-    wanted = study.covariates if asked is study.answer else ()
-    beside = [sides(product_of(part, name)) for name in wanted]
-    means = adjusted_means(sides(part.grid(asked.measure)), beside)
+    covariates = study.covariates if contrast is study.answer else ()
+    beside = [sides(product_of(part, name)) for name in covariates]
+    means = adjusted_means(sides(part.grid(contrast.measure)), beside)
     ran = np.isfinite(sides(part.grid("cell"))[0]).any(axis=(1, 2))  # rows may leave stops out
     seen = band(means[:, ran], level)
     return np.asarray((seen.high - seen.low) / 2)

@@ -160,9 +160,9 @@ def adjusted_means(sides: Sequence[Floats], covariates: Sequence[Sequence[Floats
         sides: The first and the second `(stops, persons, trials)`.
         covariates: Both sides of each.
     """
-    found = sides[0] - sides[1]
-    means = person_means(found)
-    there = np.isfinite(found)
+    differences = sides[0] - sides[1]
+    means = person_means(differences)
+    there = np.isfinite(differences)
     beside = [person_means(np.where(there, (a + b) / 2, np.nan)) for a, b in covariates]
     return adjusted(means, beside) if beside else means
 
@@ -215,8 +215,8 @@ def part_of(
     if together := design.get("zip"):
         declared = study.get("answer") or {}
         named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
-        kept = next((factor for factor in named if factor in together), together[0])
-        factors = [f for f in factors if f.name not in together or f.name == kept]
+        first = next((factor for factor in named if factor in together), together[0])
+        factors = [f for f in factors if f.name not in together or f.name == first]
     elif POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
         runs = _as_trials(runs)
         factors = [f for f in factors if f.name != POINT]
@@ -324,16 +324,16 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     if part is None or not len(part):
         return None
     declared = declared or _only_answer(part)
-    known = {f.name: f for f in part.factors}
-    over = known.get(declared.get("over", ""))
-    line = known.get(declared.get("factor", ""))
+    factor_by_name = {f.name: f for f in part.factors}
+    over = factor_by_name.get(declared.get("over", ""))
+    line = factor_by_name.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
         free = [f for f in part.factors if f is not line]
         numeric = [f for f in free if f.is_numeric and len(f.levels) > 1]
         longest = max(numeric, key=lambda f: len(f.levels), default=None)
         over = longest or next(iter(free), None)
     line = line or next((f for f in part.factors if f is not over), None)
-    within = {k: v for k, v in (declared.get("within") or {}).items() if k in known}
+    within = {k: v for k, v in (declared.get("within") or {}).items() if k in factor_by_name}
     measure = declared.get("measure") or _first_measure(part)
     return StudyView(
         part=part,
@@ -360,8 +360,10 @@ def _level_of(study: Mapping[str, Any]) -> float:
 
 def _only_answer(part: RunGrid) -> dict[str, Any]:
     """Return the only contrast that a part without a declared one allows; empty if several do."""
-    found = only_contrast({factor.name: factor.levels for factor in part.factors})
-    return {} if found is None else {k: v for k, v in found._asdict().items() if v is not None}
+    contrast = only_contrast({factor.name: factor.levels for factor in part.factors})
+    return (
+        {} if contrast is None else {k: v for k, v in contrast._asdict().items() if v is not None}
+    )
 
 
 def finding_of(view: StudyView) -> Finding | None:
@@ -369,7 +371,7 @@ def finding_of(view: StudyView) -> Finding | None:
     if view.contrast is None or view.line is None:
         return None
     panel = view.panels[0]
-    found = view.band_of(panel, *view.contrast)
+    bands = view.band_of(panel, *view.contrast)
     return Finding(
         measure=view.measure,
         in_excess=view.part.has_reference(view.measure),
@@ -379,10 +381,10 @@ def finding_of(view: StudyView) -> Finding | None:
         over=view.over.name if view.over else "",
         levels=view.stops,
         within=panel,
-        mean=found.mean,
-        low=np.maximum(found.low, -view.widest),
-        high=np.minimum(found.high, view.widest),
-        persons=found.n_persons,
+        mean=bands.mean,
+        low=np.maximum(bands.low, -view.widest),
+        high=np.minimum(bands.high, view.widest),
+        persons=bands.n_persons,
         smallest_effect=view.smallest_effect,
         usual=_usual(view, view.contrast[1]),
         missed=_missed(view),
@@ -414,13 +416,13 @@ def interval_of(values: Floats, level: float = LEVEL) -> Interval | None:
 
     The interval of persons who are all alike is that one value. None where nobody has a value.
     """
-    found = band(person_means(values[np.newaxis]), level)
-    mean, low, high = (float(x[0]) for x in (found.mean, found.low, found.high))
+    bands = band(person_means(values[np.newaxis]), level)
+    mean, low, high = (float(x[0]) for x in (bands.mean, bands.low, bands.high))
     if not np.isfinite(mean):
         return None
-    if found.n_persons > 1 and not np.isfinite(low):
+    if bands.n_persons > 1 and not np.isfinite(low):
         low = high = mean
-    return Interval(mean, low, high, found.n_persons)
+    return Interval(mean, low, high, bands.n_persons)
 
 
 def _missed(view: StudyView) -> tuple[Missed, ...]:
@@ -443,8 +445,8 @@ def _horizon(view: StudyView) -> float | None:
 
 
 def _first_measure(part: RunGrid) -> str:
-    known = {*DESIGN_COLUMNS, *(f.name for f in part.factors)}
-    measures = [c for c in part.treated if c not in known and part.has(c)]
+    keys = {*DESIGN_COLUMNS, *(f.name for f in part.factors)}
+    measures = [c for c in part.treated if c not in keys and part.has(c)]
     times = (name for name in measures if measure_called(name).awaits)
     return next(times, next(iter(measures), "seed"))
 

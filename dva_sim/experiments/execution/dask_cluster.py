@@ -195,10 +195,10 @@ async def _kind_at(address: str) -> str:
         return str((await server.identity())["type"])
 
 
-def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.kwargs) -> R:
+def _checked(task: Callable[P, R], ours: Versions, *args: P.args, **kwargs: P.kwargs) -> R:
     """Do the task on a worker, if it has the program wanted."""
     with _ONE_AT_A_TIME:
-        if other := differences(wanted, versions()):
+        if other := differences(ours, versions()):
             from distributed import get_worker
 
             raise OtherProgram(
@@ -217,8 +217,8 @@ def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.
         return result
 
 
-def differences(wanted: Versions, found: Versions) -> str:
+def differences(ours: Versions, theirs: Versions) -> str:
     """Return in what two programs differ; empty if their runs give the same."""
-    names = [name for name in {**wanted, **found} if name not in _STATE]
-    odd = [name for name in names if wanted.get(name) != found.get(name)]
-    return ", ".join(f"{name} {found.get(name)} (here {wanted.get(name)})" for name in odd)
+    names = [name for name in {**ours, **theirs} if name not in _STATE]
+    odd = [name for name in names if ours.get(name) != theirs.get(name)]
+    return ", ".join(f"{name} {theirs.get(name)} (here {ours.get(name)})" for name in odd)

@@ -70,7 +70,7 @@ class _Tried(NamedTuple):
 
 
 def dry_run(
-    asked: Study | StudyPlan,
+    study: Study | StudyPlan,
     out: str | Path,
     *,
     jobs: int | None = None,
@@ -79,7 +79,7 @@ def dry_run(
     """Return what running a study would do, without doing it.
 
     Args:
-        asked: From `load_study`, or its plan if that has been made.
+        study: From `load_study`, or its plan if that has been made.
         out: Results folder.
         jobs: Processes; by default one for each core.
         probe: Function that makes the tables of one run. With it, a few runs are tried for the
@@ -88,7 +88,7 @@ def dry_run(
     Raises:
         ConfigError: the study is not valid, or the folder holds another one.
     """
-    plan = StudyPlan.of(asked)
+    plan = StudyPlan.of(study)
     todo = list({job.key: job for job in plan.jobs}.values())
     costs = dict[RunKey, float]()
     wall = 0.0
@@ -98,12 +98,12 @@ def dry_run(
             costs = checkpoint.costs()
             wall = checkpoint.wall_s
     left = [job for job in todo if job.key not in costs]
-    known = _by_config(costs)
-    tried = _tried(left, probe) if probe is not None and not known else _Tried({})
-    cpu = _estimate(left, known or tried.costs)
+    cost_by_config = _by_config(costs)
+    tried = _tried(left, probe) if probe is not None and not cost_by_config else _Tried({})
+    cpu = _estimate(left, cost_by_config or tried.costs)
     workers = 1 if plan.is_real_time else executors.local(jobs).width
     # By the clock, for each CPU second: as it was so far, else as it was for one run at a time.
-    if known and wall:
+    if cost_by_config and wall:
         pace = wall / sum(costs.values())
     else:
         busy = tried.wall_s / sum(tried.costs.values()) if tried.costs else 1.0
@@ -131,12 +131,12 @@ def _by_config(costs: Mapping[RunKey, float]) -> dict[str, float]:
     return {config: sum(values) / len(values) for config, values in spent.items()}
 
 
-def _estimate(left: Sequence[StudyJob], known: Mapping[str, float]) -> float | None:
+def _estimate(left: Sequence[StudyJob], cost_by_config: Mapping[str, float]) -> float | None:
     """Estimate the cost of the rest [CPU s], new configurations at the mean of the others."""
-    if not known and left:
+    if not cost_by_config and left:
         return None
-    average = sum(known.values()) / max(1, len(known))
-    return sum(known.get(job.config, average) for job in left)
+    average = sum(cost_by_config.values()) / max(1, len(cost_by_config))
+    return sum(cost_by_config.get(job.config, average) for job in left)
 
 
 def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
@@ -192,10 +192,10 @@ def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
 
     Two are of one kind if they begin with the same words, up to the first number.
     """
-    found: dict[str, list[str]] = defaultdict(list)
+    kinds: dict[str, list[str]] = defaultdict(list)
     for cell in cells:
         for entry in model_for(cell.scenario).contradictions(cell.scenario):
-            found[re.split(r"\d", entry, maxsplit=1)[0]].append(entry)
+            kinds[re.split(r"\d", entry, maxsplit=1)[0]].append(entry)
     return [
-        f"{alike[0]} (in {len(alike)} of {len(cells)} configurations)" for alike in found.values()
+        f"{alike[0]} (in {len(alike)} of {len(cells)} configurations)" for alike in kinds.values()
     ]

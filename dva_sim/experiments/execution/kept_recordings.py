@@ -39,7 +39,7 @@ Row = Mapping[str, Any]
 
 
 def record_study(
-    asked: Study | StudyPlan,
+    study: Study | StudyPlan,
     out: Path,
     *,
     jobs: int | None = None,
@@ -49,7 +49,7 @@ def record_study(
     """Make the recordings that a study asks for and its results folder does not hold yet.
 
     Args:
-        asked: A study, or its plan, with all its runs in the folder.
+        study: A study, or its plan, with all its runs in the folder.
         out: Its results folder.
         jobs: Processes; by default one for each core.
         progress: Called with the number of recordings there are and of all.
@@ -65,18 +65,18 @@ def record_study(
         DvaSimError: the folder cannot be written.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
-    plan = StudyPlan.of(asked)
+    plan = StudyPlan.of(study)
     if plan.study.record is None:
         return []
     with FolderLock(out):
         rows = rows_of(Results.load(out))
-        wanted = {name_of(job): job for job in chosen(plan, rows)}
-        folder = _tidied(out / FOLDER, wanted)
-        rest = [job for name, job in wanted.items() if not (folder / name).exists()]
+        job_by_name = {name_of(job): job for job in chosen(plan, rows)}
+        folder = _tidied(out / FOLDER, job_by_name)
+        rest = [job for name, job in job_by_name.items() if not (folder / name).exists()]
         own = {measure.about.name for measure in plan.measures.values()}
         prints = {name_of(job): _fingerprint(job, rows[job.address], own) for job in rest}
-        done = len(wanted) - len(rest)
-        total = len(wanted)
+        done = len(job_by_name) - len(rest)
+        total = len(job_by_name)
         progress(done, total)
         problems = []
         rerun = Rerun(folder, prints)
@@ -137,11 +137,11 @@ def badness(measure: str, row: Row) -> float:
     return -float(value) if measure_called(measure).better == "large" else float(value)
 
 
-def _tidied(folder: Path, wanted: Iterable[str]) -> Path:
+def _tidied(folder: Path, recordings: Iterable[str]) -> Path:
     """Return the folder without what an earlier choice or a killed process has left."""
     try:
         folder.mkdir(exist_ok=True)
-        names = set(wanted)
+        names = set(recordings)
         for path in folder.glob("*.mcap"):
             if path.name not in names:
                 path.unlink()
@@ -204,8 +204,8 @@ class Rerun:
 
 def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
     """Hash of a run's measures, without its design columns and the user's measures."""
-    asked = {*DESIGN_COLUMNS, *job.levels, *own}
-    return _print_of({name: value for name, value in row.items() if name not in asked})
+    inputs = {*DESIGN_COLUMNS, *job.levels, *own}
+    return _print_of({name: value for name, value in row.items() if name not in inputs})
 
 
 def _print_of(row: Row) -> str:

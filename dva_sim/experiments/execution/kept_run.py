@@ -140,14 +140,14 @@ class KeptRun:
 
     def _next(self, is_behind: bool) -> tuple[list[JournalLine], bool]:
         """Return the new lines, and True if these were the last; lines that failed are retried."""
-        found: list[JournalLine] = []
+        journal_lines: list[JournalLine] = []
         with suppress(queue.Empty):
             batch = self._waiting.get(timeout=AGAIN if is_behind else None)
             while batch is not None:
-                found += batch
+                journal_lines += batch
                 batch = self._waiting.get_nowait()
-            return found, True
-        return found, False
+            return journal_lines, True
+        return journal_lines, False
 
     def _keep(self, lines: Iterable[JournalLine]) -> None:
         if not is_left(self._folder):
@@ -246,8 +246,8 @@ def _read(
     mode = "rw" if os.access(folder, os.W_OK) else "ro&immutable=1"
     try:
         with closing(_connected(folder, mode)) as db:
-            asked = "SELECT format, manifest, scenario, seed FROM run"
-            form, manifest, scenario, seed = db.execute(asked).fetchone()
+            query = "SELECT format, manifest, scenario, seed FROM run"
+            form, manifest, scenario, seed = db.execute(query).fetchone()
             if form > _FORMAT:
                 raise ConfigError("was made by a later version of dva-sim", path)
             db.execute("BEGIN")  # both of the same moment

@@ -77,10 +77,10 @@ def sampled_runs(
         processes: Number of runs at a time.
     """
     with ProcessPoolExecutor(processes, mp_context=get_context("forkserver")) as pool:
-        asked = {
+        samples = {
             name: pool.map(run_sampled, sampled_jobs(study)) for name, study in studies.items()
         }
-        for name, runs in asked.items():
+        for name, runs in samples.items():
             yield name, list(runs)
 
 

@@ -159,7 +159,11 @@ class StudySession:
         """Return the table `runs` of some batches, without repeats."""
         own = [job for job in self.in_order(batches) if not job.is_repeat]
         tables = ((job, self.journal.tables(job.key) or {}) for job in own)
-        rows = (design_row(job) | row for job, found in tables for row in found.get("runs", ()))
+        rows = (
+            design_row(job) | row
+            for job, run_tables in tables
+            for row in run_tables.get("runs", ())
+        )
         return frame_of(list(rows))
 
     def write(self, batches: Sequence[Sequence[StudyJob]], stopped: dict[str, Any]) -> None:
@@ -218,9 +222,11 @@ def _opened(out: Path, identity: str) -> Checkpoint:
     """Return the journal of a results folder, which must be this study's or new."""
     try:
         if not (out / JOURNAL).exists() and (out / MANIFEST).exists():
-            found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
-            if found != identity:
-                raise ConfigError(f"{out} holds another study ({found}); give another folder")
+            held_identity = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
+            if held_identity != identity:
+                raise ConfigError(
+                    f"{out} holds another study ({held_identity}); give another folder"
+                )
     except OSError as error:
         raise DvaSimError(f"{out} cannot be read: {error.strerror}") from None
     except ValueError:
@@ -235,11 +241,11 @@ def _is_written(out: Path, manifest: dict[str, Any]) -> bool:
     make the same tables; only a program that is being changed may write them in another way.
     """
     try:
-        found = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
+        written = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    asked = json.loads(json.dumps({**manifest, "tables": digests(out / TABLES)}))
-    return bool(found == asked and not manifest["versions"]["dirty"])
+    expected = json.loads(json.dumps({**manifest, "tables": digests(out / TABLES)}))
+    return bool(written == expected and not manifest["versions"]["dirty"])
 
 
 def _tidy(out: Path) -> None:

@@ -114,11 +114,11 @@ def _difference(
     view: StudyView, finding: Finding, panel: Setting, stop: int
 ) -> tuple[float, float, float]:
     """Mean and band under other settings, within what is possible."""
-    found = view.band_of(panel, finding.first, finding.second)
+    bands = view.band_of(panel, finding.first, finding.second)
     low, high = (
-        float(np.clip(x[stop], -view.widest, view.widest)) for x in (found.low, found.high)
+        float(np.clip(x[stop], -view.widest, view.widest)) for x in (bands.low, bands.high)
     )
-    return float(found.mean[stop]), low, high
+    return float(bands.mean[stop]), low, high
 
 
 def _apart(panel: Setting, usual: Setting) -> str:
@@ -203,16 +203,16 @@ def _of_team(group: Mapping[str, Any], contains: bool) -> str:
 
 def _typical(law: Mapping[str, Any]) -> float:
     """Return the median of a law if it has one, else its mean, else its middle [s]."""
-    known = [law[key] for key in ("median_s", "mean_s") if law.get(key)]
-    return float(known[0] if known else (law.get("low_s", 0) + law.get("high_s", 0)) / 2)
+    middles = [law[key] for key in ("median_s", "mean_s") if law.get(key)]
+    return float(middles[0] if middles else (law.get("low_s", 0) + law.get("high_s", 0)) / 2)
 
 
 def _hidden(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> list[Unnoticed]:
     """Return hidden effects; nothing where the scenario or its site is not as it was."""
     streams = [{k: v for k, v in stream.items() if v != ""} for stream in scenario["demand"]]
     try:
-        known = TimedScenario.model_validate(dict(scenario) | {"demand": streams})
-        now = hashes_of(input_names([known]))
-        return list(unnoticed(known)) if now.items() <= inputs.items() else []
+        scenario_model = TimedScenario.model_validate(dict(scenario) | {"demand": streams})
+        now = hashes_of(input_names([scenario_model]))
+        return list(unnoticed(scenario_model)) if now.items() <= inputs.items() else []
     except (ConfigError, ValidationError):
         return []

@@ -91,7 +91,7 @@ def spread_table(view: StudyView) -> CellTable | None:
     return CellTable(view.part.name, heads, 2, rows)
 
 
-def _printed(found: Components) -> list[str]:
+def _printed(parts: Components) -> list[str]:
     """Return standard deviations in the measure's unit, and the share between persons."""
-    deviations: Floats = np.sqrt([found.between, found.within])
-    return [*(number(float(x)) for x in deviations), percent(found.share)]
+    deviations: Floats = np.sqrt([parts.between, parts.within])
+    return [*(number(float(x)) for x in deviations), percent(parts.share)]

@@ -128,9 +128,9 @@ def _constant(table: CellTable) -> list[int]:
 
 def _without_constants(table: CellTable) -> CellTable:
     """Return the table without the columns that do not vary."""
-    kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
-    heads = [table.heads[n] for n in kept]
-    rows = [[row[n] for n in kept] for row in table.rows]
+    columns = [n for n in range(len(table.heads)) if n not in _constant(table)]
+    heads = [table.heads[n] for n in columns]
+    rows = [[row[n] for n in columns] for row in table.rows]
     return replace(table, heads=heads, rows=rows)
 
 

@@ -116,10 +116,10 @@ class EpisodeRequest:
         """Run one of its scenarios."""
         started = time.perf_counter()
         if isinstance(scenario, Scenario):
-            kept = simulate(scenario, self.seed, self.pictures.any or self._record is not None)
+            run = simulate(scenario, self.seed, self.pictures.any or self._record is not None)
         else:
-            kept = model_for(scenario).simulate(scenario, self.seed)
-        return Played(scenario, self.seed, kept, time.perf_counter() - started)
+            run = model_for(scenario).simulate(scenario, self.seed)
+        return Played(scenario, self.seed, run, time.perf_counter() - started)
 
     def write(self, runs: Sequence[Played]) -> Iterator[str]:
         """Write what is asked for, and say of each what it is and where.
@@ -178,6 +178,6 @@ def write_replay(opened: Opened, pictures: Wanted, ros2: Path | None) -> Iterato
 def _two_patterns(text: str) -> list[str]:
     patterns = [p.strip() for p in text.split(",")]
     if len(patterns) != 2 or any(":" not in p and p not in known_patterns() for p in patterns):
-        wanted = f"two of {', '.join(known_patterns())}, as in req-rep,latest-wins"
-        raise ConfigError(f"--side-by-side {text!r} should name {wanted}")
+        valid = f"two of {', '.join(known_patterns())}, as in req-rep,latest-wins"
+        raise ConfigError(f"--side-by-side {text!r} should name {valid}")
     return patterns

@@ -55,17 +55,17 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
 
 def _few(tested: Tested, cluster: str) -> str:
     """Say that a hypothesis stayed open for want of persons; else an empty text."""
-    found = tested.difference
+    difference = tested.difference
     least = tested.contrast.smallest or tested.hypothesis.margin or None
-    is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
-    return too_few(found.n_persons, cluster) if is_few and found is not None else ""
+    is_few = tested.verdict == "open" and difference is not None and _are_few(difference, least)
+    return too_few(difference.n_persons, cluster) if is_few and difference is not None else ""
 
 
-def _are_few(found: Interval, smallest: float | None, tests: int = 1) -> bool:
+def _are_few(interval: Interval, smallest: float | None, tests: int = 1) -> bool:
     """Return True if the test, or ruling out the declared difference, needs more persons."""
-    if _least_p(found.n_persons, tests) > 1 - LEVEL:
+    if _least_p(interval.n_persons, tests) > 1 - LEVEL:
         return True
-    return smallest is not None and max(-found.low, found.high) > smallest
+    return smallest is not None and max(-interval.low, interval.high) > smallest
 
 
 def _least_p(persons: int, tests: int) -> float:
@@ -116,11 +116,11 @@ def verdict_lead(
     )
 
 
-def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
+def comparison_table(judgement: Judgement, cluster: str = "person") -> CellTable:
     """Return each comparison at each level it runs over."""
-    compared = found.compared
+    compared = judgement.compared
     families = Counter(c.contrast.family for c in compared)
-    families.update(t.contrast.family for t in found.tested)
+    families.update(t.contrast.family for t in judgement.tested)
     heads = ["comparison", "difference in", "at", "first minus second (95 % interval)"]
     heads += ["in standard deviations", "correlation of pairs", "p", "p by Holm", "apart?"]
     rows = [
@@ -190,11 +190,12 @@ def _found(tested: Tested) -> str:
     return text if tested.difference is None else f"{text[:-1]}, {100 * tested.level:.3g} %)"
 
 
-def _interval(found: Interval | None, measure: str) -> str:
-    if found is None:
+def _interval(interval: Interval | None, measure: str) -> str:
+    if interval is None:
         return "not run"
     unit = unit_of(measure)
-    return f"{quantity(found.mean, unit)} ({number(found.low)} to {quantity(found.high, unit)})"
+    mean, high = quantity(interval.mean, unit), quantity(interval.high, unit)
+    return f"{mean} ({number(interval.low)} to {high})"
 
 
 def _p(value: float) -> str:
@@ -204,13 +205,13 @@ def _p(value: float) -> str:
 
 
 def _apart(compared: Compared, cluster: str, tests: int) -> str:
-    found = compared.difference
-    if not math.isfinite(compared.adjusted) or found is None:
+    difference = compared.difference
+    if not math.isfinite(compared.adjusted) or difference is None:
         return "–"
     if compared.adjusted <= 1 - LEVEL:
         return "✓ yes"
-    is_few = _are_few(found, compared.contrast.smallest, tests)
-    return f"? {too_few(found.n_persons, cluster)}" if is_few else "? not shown"
+    is_few = _are_few(difference, compared.contrast.smallest, tests)
+    return f"? {too_few(difference.n_persons, cluster)}" if is_few else "? not shown"
 
 
 _DIGITS = 16
@@ -236,9 +237,9 @@ def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -
         runs: The table of runs.
         persons: Number of persons simulated.
     """
-    found = manifest["status"]["registration"]
+    registration = manifest["status"]["registration"]
     study = manifest["study"]
-    plan = found.get("plan") or {}
+    plan = registration.get("plan") or {}
     versions = manifest.get("versions") or {}
     rows = [
         ["persons x trials", _size(plan, plan.get("persons")), _size(study, persons)],
@@ -246,12 +247,12 @@ def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -
         ["design", _design(plan), _design(study)],
         [
             "made with",
-            found.get("made_with", "–"),
+            registration.get("made_with", "–"),
             f"{versions.get('dva-sim')} {versions.get('fingerprint')}",
         ],
-        ["judged with", found.get("judged_with") or "–", fingerprint_of_judges()],
-        ["hash", str(found.get("hash", ""))[:_DIGITS], ""],
-        ["earlier registrations", *_earlier(found.get("earlier") or ())],
+        ["judged with", registration.get("judged_with") or "–", fingerprint_of_judges()],
+        ["hash", str(registration.get("hash", ""))[:_DIGITS], ""],
+        ["earlier registrations", *_earlier(registration.get("earlier") or ())],
     ]
     return CellTable("", ["", "as registered", "as run"], 3, rows)
 
@@ -287,5 +288,5 @@ def _earlier(hashes: Sequence[str]) -> tuple[str, str]:
     return f"{len(hashes)}: {', '.join(h[:_DIGITS] for h in hashes)}", ""
 
 
-def _bare(found: Interval) -> str:
-    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
+def _bare(interval: Interval) -> str:
+    return f"{number(interval.mean)} ({number(interval.low)} to {number(interval.high)})"

@@ -131,7 +131,7 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
     finding = reading.finding
     if versions.get("dirty"):
         raise ConfigError(f"{folder}: was run by a program with changes that are not committed")
-    kept = KeptAnswer(
+    answer = KeptAnswer(
         study=str(manifest["usual"]["name"]),
         question=str(manifest["question"]),
         answer=reading.answer.lead,
@@ -153,14 +153,14 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
         map=_table(reading, choice_table),
         beside=_table(reading, beside_table),
     )
-    return kept, manifest
+    return answer, manifest
 
 
 def _table(reading: Reading, of_map: Callable[[ChoiceMap, str], CellTable]) -> Table:
     if reading.map is None:
         return ()
-    found = of_map(reading.map, "")
-    return tuple(map(tuple, (found.heads, *found.rows)))
+    cells = of_map(reading.map, "")
+    return tuple(map(tuple, (cells.heads, *cells.rows)))
 
 
 def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
@@ -181,10 +181,10 @@ def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
     return next((f for f in sorted(before.keys() & files) if before[f] != files[f]), "")
 
 
-def _without_question(kept: Any) -> Any:
-    if not isinstance(kept, Mapping):
-        return kept
-    return {key: value for key, value in kept.items() if key != "question"}
+def _without_question(data: Any) -> Any:
+    if not isinstance(data, Mapping):
+        return data
+    return {key: value for key, value in data.items() if key != "question"}
 
 
 def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
@@ -207,19 +207,19 @@ def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
             raise ConfigError(f"{folder}: this program gives another {where}; run the study again")
 
 
-def _is_equal(kept: Any, value: Any) -> bool:
+def _is_equal(cell: Any, value: Any) -> bool:
     """Compare a cell of a table with what it was written from; what is missing there is nan."""
     if value is None or value != value:
-        return kept is None or kept != kept
-    return bool(kept == value)
+        return cell is None or cell != cell
+    return bool(cell == value)
 
 
 def _rows(reading: Reading) -> tuple[AnswerRow, ...]:
-    found = reading.finding
-    if found is None:
+    finding = reading.finding
+    if finding is None:
         return ()
-    columns = (found.mean.tolist(), found.low.tolist(), found.high.tolist())
-    levels = found.levels if found.over else (None,)
+    columns = (finding.mean.tolist(), finding.low.tolist(), finding.high.tolist())
+    levels = finding.levels if finding.over else (None,)
     return tuple(AnswerRow(*row) for row in zip(levels, *columns, strict=True))
 
 

@@ -123,13 +123,13 @@ def _alike(reading: Reading) -> str:
     """Report the observed gain from pairing."""
     if reading.pair_correlation is None:
         return ""
-    found = _reduction(reading)
-    is_known = found is not None and np.isfinite(found.ratio.mean)
+    reduction = _reduction(reading)
+    is_known = reduction is not None and np.isfinite(reduction.ratio.mean)
     return sentence(
         "alike",
         correlation=reading.pair_correlation,
-        ratio=found.ratio if found is not None and is_known else None,
-        is_lower=found is not None and found.is_lower,
+        ratio=reduction.ratio if reduction is not None and is_known else None,
+        is_lower=reduction is not None and reduction.is_lower,
     )
 
 
@@ -145,16 +145,16 @@ def _reduction(reading: Reading) -> VarianceReduction | None:
 
 def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
     """Say in which conditions a repeated request has no time for its reply; see `waits`."""
-    known = waits(scenarios, study)
-    if not known:
+    found_waits = waits(scenarios, study)
+    if not found_waits:
         return ""
     trips: dict[str, list[str]] = {}
-    for timeout, trip in sorted({(w.timeout, w.round_trip) for w in known if w.is_short}):
+    for timeout, trip in sorted({(w.timeout, w.round_trip) for w in found_waits if w.is_short}):
         where = trips.setdefault(level_name("command.timeout_s", timeout), [])
         where.append(level_name("link.delay_s", trip))
     return sentence(
         "time_out",
         short=[f"{timeout} with round trips of {', '.join(at)}" for timeout, at in trips.items()],
-        needed=level_name("command.timeout_s", max(w.needed for w in known)),
-        is_all=all(w.is_short for w in known),
+        needed=level_name("command.timeout_s", max(w.needed for w in found_waits)),
+        is_all=all(w.is_short for w in found_waits),
     )

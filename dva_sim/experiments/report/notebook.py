@@ -61,12 +61,14 @@ class Episode:
         return f"<table>{''.join(rows)}</table>"
 
 
-def episode_of(scenario: AnyScenario, seed: int, tables: Tables, kept: object = None) -> Episode:
+def episode_of(
+    scenario: AnyScenario, seed: int, tables: Tables, recording: object = None
+) -> Episode:
     """Return a run by its tables.
 
     If what is kept of it is a recording, everybody's track is one more.
     """
-    tracks = {"tracks": track_rows(kept)} if isinstance(kept, Recording) else {}
+    tracks = {"tracks": track_rows(recording)} if isinstance(recording, Recording) else {}
     made = {name: frame_of(rows) for name, rows in (tables | tracks).items()}
     return Episode(scenario, seed, made)
 

@@ -33,10 +33,10 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
     stop = stops[-1]
     within = f"with {setting(finding.within)}" if finding.within else ""
     levels = [level_name(finding.factor, side) for side in sides]
-    found = endings.difference(*sides, stop)
-    sign = 1 if found.mean > 0 else -1
-    low, high = sorted(sign * max(-1.0, min(end, 1.0)) for end in (found.low, found.high))
-    is_known = bool(np.isfinite(found.low) and found.mean != 0)
+    difference = endings.difference(*sides, stop)
+    sign = 1 if difference.mean > 0 else -1
+    low, high = sorted(sign * max(-1.0, min(end, 1.0)) for end in (difference.low, difference.high))
+    is_known = bool(np.isfinite(difference.low) and difference.mean != 0)
     return [
         sentence(
             "endings",
@@ -47,7 +47,7 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
             first=levels[0],
             second=levels[1],
             direction="above" if sign > 0 else "below",
-            points=number(100 * abs(found.mean)) if is_known else "",
+            points=number(100 * abs(difference.mean)) if is_known else "",
             ends=f"{number(100 * low)} to {number(100 * high)}" if low < high else "",
         )
     ]
@@ -132,12 +132,12 @@ def _side(view: StudyView, ended: Ended) -> str:
     return f"{name}: {listing(clauses)}"
 
 
-def _share(found: Interval) -> str:
+def _share(interval: Interval) -> str:
     """Return a share with its interval, where there are enough persons for one."""
-    if not np.isfinite(found.low):
-        return percent(found.mean)
-    low = percent(found.low).removesuffix("\N{NO-BREAK SPACE}%")
-    return f"{percent(found.mean)} ({low} to {percent(found.high)})"
+    if not np.isfinite(interval.low):
+        return percent(interval.mean)
+    low = percent(interval.low).removesuffix("\N{NO-BREAK SPACE}%")
+    return f"{percent(interval.mean)} ({low} to {percent(interval.high)})"
 
 
 _SEEN = "confirmed", "contained"

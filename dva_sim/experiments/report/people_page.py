@@ -173,5 +173,5 @@ def _event(row: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _median(values: Any) -> str:
-    known = np.asarray(values, float)
-    return number(float(np.nanmedian(known))) if np.isfinite(known).any() else "–"
+    numbers = np.asarray(values, float)
+    return number(float(np.nanmedian(numbers))) if np.isfinite(numbers).any() else "–"

@@ -23,7 +23,7 @@ _NODES = re.compile(rb"(?<=\(node)\d{8}(?=\))")  # the browser's own numbers of 
 
 def browser() -> str | None:
     """Return the path of a browser that can print without a window; None if there is none."""
-    return next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
 
 
 def print_page(page: Path, to: Path) -> None:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 def caption(name: str, **facts: Any) -> str:
     """Render a section of `captions.txt.j2`: a line that is shown, and one that is folded away."""
-    shown, _, folded = _sections("captions")[name].partition("\n\n")
-    return "\n".join(filter(None, (_rendered(text, facts) for text in (shown, folded))))
+    visible, _, folded = _sections("captions")[name].partition("\n\n")
+    return "\n".join(filter(None, (_rendered(text, facts) for text in (visible, folded))))
 
 
 def note(name: str, **facts: Any) -> str:
@@ -31,8 +31,8 @@ def sentence(name: str, **facts: Any) -> str:
 def paragraphs(name: str, **facts: Any) -> list[str]:
     """Render a template to paragraphs, one line each."""
     template = _environment(trim=True).get_template(f"{name}.txt.j2")
-    found = template.render(facts).split("\n\n")  # empty lines part paragraphs
-    return [line for text in found if (line := _in_a_line(text))]
+    texts = template.render(facts).split("\n\n")  # empty lines part paragraphs
+    return [line for text in texts if (line := _in_a_line(text))]
 
 
 def _in_a_line(text: str) -> str:

@@ -80,11 +80,11 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
         reading: The results.
         drawn: The figures; the first is the one that answers.
     """
-    found = reading.answer
+    answer = reading.answer
     blocks = list(
         chain(
             _status(reading),
-            [First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))],
+            [First(answer.lead, drawn[0] if drawn else None, tuple(answer.depends.items()))],
             _events(reading),
             _claims(reading),
             _comparisons(reading),
@@ -184,9 +184,9 @@ def _endings(reading: Reading) -> Iterator[Block]:
     yield Heading(f"How it ended, in part {view.part.name}")
     for sentence in sentences_of_endings(endings, view, reading.finding):
         yield Words(sentence)
-    found = endings_table(endings, view, reading.cluster)
-    if found.rows:
-        yield Folded(f"The shares of all {len(found.rows)} configurations", (Printed(found),))
+    shares = endings_table(endings, view, reading.cluster)
+    if shares.rows:
+        yield Folded(f"The shares of all {len(shares.rows)} configurations", (Printed(shares),))
 
 
 def _found(reading: Reading) -> Iterator[Block]:
@@ -197,8 +197,8 @@ def _found(reading: Reading) -> Iterator[Block]:
         yield Printed(choice_table(reading.map, part), is_words=True)
         yield Folded("What drives are like", (Printed(beside_table(reading.map, part)),))
     table = answer_table(reading)
-    shown: list[Block] = [Printed(table)] if table is not None else []
-    numbers = [*shown, *map(Words, reading.answer.notes)]
+    blocks: list[Block] = [Printed(table)] if table is not None else []
+    numbers = [*blocks, *map(Words, reading.answer.notes)]
     if reading.map is not None and numbers:
         yield Folded("One pair of choices in numbers", tuple(numbers))
     elif numbers:

@@ -89,8 +89,8 @@ class ResultsReading:
     @property
     def scenarios(self) -> Mapping[str, Mapping[str, Any]]:
         """Each part's scenario before any factor changed it."""
-        found: Mapping[str, Mapping[str, Any]] = self.manifest.get("scenarios", {})
-        return found
+        scenarios: Mapping[str, Mapping[str, Any]] = self.manifest.get("scenarios", {})
+        return scenarios
 
     def scenario_of(self, part: str) -> Mapping[str, Any]:
         """Return one part's scenario."""
@@ -118,13 +118,13 @@ class ResultsReading:
     def finding(self) -> Finding | None:
         """The declared contrast as measured; None, too, where it is withheld."""
         view = self.view
-        if view is None or (found := finding_of(view)) is None:
+        if view is None or (finding := finding_of(view)) is None:
             return None
         several = {factor.name for factor in view.part.factors if len(factor.levels) > 1}
         return replace(
-            found,
+            finding,
             failed=len(self.results.failures),
-            within={name: level for name, level in found.within.items() if name in several},
+            within={name: level for name, level in finding.within.items() if name in several},
             outside=tuple(view.stops_outside(view.panels[0], view.contrast)),
         )
 
@@ -160,8 +160,8 @@ class ResultsReading:
         if self.view is None or self.by_people or "closing_s" not in events:
             return None
         horizon = horizon_of(self.view, self.scenario_of(self.view.part.name))
-        found = Endings(self.view, events, self.runs, horizon)
-        return found if len(found) and np.isfinite(horizon) else None
+        endings = Endings(self.view, events, self.runs, horizon)
+        return endings if len(endings) and np.isfinite(horizon) else None
 
     @cached_property
     def events(self) -> EventOutcomes | None:
@@ -204,8 +204,8 @@ class ResultsReading:
         both = np.isfinite(first) & np.isfinite(second)
         if both.sum() < _FEWEST_PAIRS:
             return None
-        found = statistics.pair_correlation(first[both], second[both])
-        return found if np.isfinite(found) else None
+        correlation = statistics.pair_correlation(first[both], second[both])
+        return correlation if np.isfinite(correlation) else None
 
     def trials_of(self, part: str) -> int:
         """Return trials per person in a part; 0 if unknown."""

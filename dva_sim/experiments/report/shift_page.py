@@ -87,10 +87,10 @@ class ShiftPage(ModelPage):
                 "No contrast was declared that could answer the question; figures show the runs.",
                 notes=_notes(self.shifts),
             )
-        found = answer(self.worded(finding))
+        worded_answer = answer(self.worded(finding))
         price = {"In return": _price(finding, self.shifts)} if self.shifts.can_spare else {}
-        notes = [*_notes(self.shifts), *found.notes]
-        return replace(found, depends=found.depends | price, notes=notes)
+        notes = [*_notes(self.shifts), *worded_answer.notes]
+        return replace(worded_answer, depends=worded_answer.depends | price, notes=notes)
 
     def cells(self, part: RunGrid) -> CellTable | None:
         """Return the table of the answer's part, with percentiles over all its events."""
@@ -139,14 +139,16 @@ def _cells(shifts: Shifts) -> CellTable:
     table = cell_table(part, shifts.view.measure, SUMMARIES)
     if shifts.events is None:
         return table
-    known = [table.heads.index(head) for _, head, _, _ in SUMMARIES if head in table.heads]
-    at = min(known, default=len(table.heads))
+    places = [table.heads.index(head) for _, head, _, _ in SUMMARIES if head in table.heads]
+    at = min(places, default=len(table.heads))
     dashes = ["–" for _ in PERCENTILES]
     rows = []
     for setting, row in zip(part.settings(), table.rows, strict=True):
         is_shown = shifts.view.panels[0].items() <= setting.items()
-        found = _percentiles(shifts.events.rows_at(setting), shifts.follow) if is_shown else dashes
-        rows.append([*row[:at], *found, *row[at:]])
+        percentiles = (
+            _percentiles(shifts.events.rows_at(setting), shifts.follow) if is_shown else dashes
+        )
+        rows.append([*row[:at], *percentiles, *row[at:]])
     heads = [f"response, p{q} [s]" for q in PERCENTILES]
     return replace(table, heads=[*table.heads[:at], *heads, *table.heads[at:]], rows=rows)
 
@@ -164,10 +166,10 @@ def _price(finding: Finding, shifts: Shifts) -> str:
     first = str(finding.first)
     second = str(finding.second)
     base = shifts.means("exposure_look_s")[shifts.policies.index(second)]
-    found = shifts.against("exposure_look_s", second)
+    bands = shifts.against("exposure_look_s", second)
     row = shifts.policies.index(first)
     shape = (len(shifts.policies), -1)
-    mean, low, high = (x.reshape(shape)[row] for x in (found.mean, found.low, found.high))
+    mean, low, high = (x.reshape(shape)[row] for x in (bands.mean, bands.low, bands.high))
     prices = [
         f"{number(m)} s ({number(a)} to {number(b)}; {second}: {number(z)} s) at {title}"
         for m, a, b, z, title in zip(mean, low, high, base, shifts.titles, strict=True)
@@ -197,8 +199,8 @@ def _quickest(shifts: Shifts, stop: int) -> tuple[str, float, list[str]]:
     response = shifts.means("response_mean_s")
     candidates = [i for i, p in enumerate(shifts.policies) if p != BEST]
     best = min(candidates, key=lambda i: response[i, stop])
-    found = shifts.against("response_mean_s", shifts.policies[best])
-    low = found.low.reshape(response.shape)[:, stop]
+    bands = shifts.against("response_mean_s", shifts.policies[best])
+    low = bands.low.reshape(response.shape)[:, stop]
     equal = [shifts.policies[i] for i in candidates if i != best and not low[i] > 0]
     return shifts.policies[best], float(response[best, stop]), equal
 
@@ -223,11 +225,11 @@ def _contained(shifts: Shifts, stop: int, title: str) -> str:
 
 def _progress(shifts: Shifts, stop: int, title: str) -> str:
     """Return `89 % at load 0.31 (min_eta, 24 to 154 %)`: the best policy's share of the way."""
-    found = shifts.progress(stop)
-    best = int(np.nanargmax(found.mean))
-    low, high = (100 * float(edge[best]) for edge in (found.low, found.high))
+    bands = shifts.progress(stop)
+    best = int(np.nanargmax(bands.mean))
+    low, high = (100 * float(edge[best]) for edge in (bands.low, bands.high))
     name = shifts.travellers[best]
-    return f"{100 * found.mean[best]:.0f} % at {title} ({name}, {low:.0f} to {high:.0f} %)"
+    return f"{100 * bands.mean[best]:.0f} % at {title} ({name}, {low:.0f} to {high:.0f} %)"
 
 
 # --- the rest of the page ----------------------------------------------------------------------
@@ -242,7 +244,9 @@ def _ground(scenario: Mapping[str, Any]) -> str:
 def _team(scenario: Mapping[str, Any]) -> str:
     groups = scenario.get("responders", [])
     kinds = {k: [g for g in groups if g.get("kind", "guard") == k] for k in ("guard", "robot")}
-    counts = {k: sum(g.get("count", 1) for g in found) for k, found in kinds.items()}
+    counts = {
+        k: sum(g.get("count", 1) for g in groups_of_kind) for k, groups_of_kind in kinds.items()
+    }
     words = [f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items() if n]
     return listing(words)
 

@@ -94,24 +94,24 @@ def _usually(reading: Reading, usual: Mapping[str, Any]) -> list[str]:
     return [_people(usual["persons"], usual["replications"], reading.cluster), *levels]
 
 
-def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
+def plan_table(plans: Sequence[SizePlan], cluster: str) -> CellTable:
     """Return a line for each plan."""
     heads = ["to show", "if the true difference is"]
     heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
     rows = [
         [f"{p.name}: {p.what}", p.assumed, *(map(_count_text, p.counts) if p.counts else _NEVER)]
-        for p in found
+        for p in plans
     ]
-    return CellTable("", heads, len(heads), rows, note=_assumes(found, cluster))
+    return CellTable("", heads, len(heads), rows, note=_assumes(plans, cluster))
 
 
-def plan_lines(found: Sequence[SizePlan], cluster: str) -> list[str]:
+def plan_lines(plans: Sequence[SizePlan], cluster: str) -> list[str]:
     """Return a line for each plan, and what they assume."""
     lines = [
         f"To show {p.name} ({p.what}), if the true difference is {p.assumed}: {_line(p, cluster)}."
-        for p in found
+        for p in plans
     ]
-    return [*lines, _assumes(found, cluster)] if found else []
+    return [*lines, _assumes(plans, cluster)] if plans else []
 
 
 _NEVER = ["no number: it is not true then"] * len(POWERS)
@@ -121,8 +121,8 @@ def _line(plan: SizePlan, cluster: str) -> str:
     if not plan.counts:
         return "no number of them, for it is not true then"
     needed = [
-        f"{_count_text(count)} {cluster}s for {100 * wanted:.0f} % power"
-        for count, wanted in zip(plan.counts, POWERS, strict=True)
+        f"{_count_text(count)} {cluster}s for {100 * power:.0f} % power"
+        for count, power in zip(plan.counts, POWERS, strict=True)
     ]
     return ", ".join(needed)
 
@@ -135,7 +135,7 @@ def _persons(count: float) -> str:
     return f"{count:.0f}" if math.isfinite(count) else f"more than {MOST_PERSONS:,}"
 
 
-def _assumes(found: Sequence[SizePlan], cluster: str) -> str:
-    counts = sorted({plan.known_from for plan in found})
-    known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    return note("sample_size", cluster=cluster, known=known)
+def _assumes(plans: Sequence[SizePlan], cluster: str) -> str:
+    counts = sorted({plan.known_from for plan in plans})
+    counted = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    return note("sample_size", cluster=cluster, known=counted)

@@ -58,16 +58,16 @@ class Reading(ResultsReading):
             return Answer("No run was completed, so there is nothing to answer with.")
         if why := self.distrusted.get(self.view.part.name):
             return Answer(f"The answer is withheld: {why}. Fix this, and run the study again.")
-        found = self.page.answer(in_context(self))
+        answer = self.page.answer(in_context(self))
         tested = self.judgement.tested if self._confirms else []
         if tested:
-            rest = f"Not registered, over all levels at once: {found.lead}"
-            found = replace(found, lead=self._verdicts(tested), notes=[rest, *found.notes])
+            rest = f"Not registered, over all levels at once: {answer.lead}"
+            answer = replace(answer, lead=self._verdicts(tested), notes=[rest, *answer.notes])
         if self.map is not None:
-            found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
+            answer = replace(answer, lead=lead_of(self.map), notes=[answer.lead, *answer.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
-        notes = [*self._why_nothing, *found.notes, *self._undeclared, *filter(None, weighed)]
-        return replace(found, depends=found.depends | depends(self), notes=notes)
+        notes = [*self._why_nothing, *answer.notes, *self._undeclared, *filter(None, weighed)]
+        return replace(answer, depends=answer.depends | depends(self), notes=notes)
 
     @property
     def _why_nothing(self) -> Sequence[str]:
@@ -117,8 +117,12 @@ class Reading(ResultsReading):
     def _trusted(self) -> Table:
         """The runs of all parts but those that are distrusted; empty without any."""
         parts = np.asarray(self.runs["part"]) if self.runs else np.empty(0)
-        kept = ~np.isin(parts, list(self.distrusted))
-        return {name: np.asarray(self.runs[name])[kept] for name in self.runs} if kept.any() else {}
+        is_trusted = ~np.isin(parts, list(self.distrusted))
+        return (
+            {name: np.asarray(self.runs[name])[is_trusted] for name in self.runs}
+            if is_trusted.any()
+            else {}
+        )
 
     @cached_property
     def plans(self) -> list[SizePlan]:
@@ -177,27 +181,29 @@ class Reading(ResultsReading):
     @property
     def warnings(self) -> list[str]:
         """Warnings to be shown first."""
-        found = []
+        lines = []
         if failures := self.results.failures:
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
-            shown = "; ".join(list(errors)[:_MOST_ERRORS])
-            found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
+            first_errors = "; ".join(list(errors)[:_MOST_ERRORS])
+            lines.append(
+                f"Runs that failed and are missing below: {len(failures)} ({first_errors})."
+            )
         for part, reason in self.distrusted.items():
-            found.append(f"In part {part} {reason}: no contrast of this part is shown.")
+            lines.append(f"In part {part} {reason}: no contrast of this part is shown.")
         if self.events is not None and self.events.warns:
-            found.append(str(self.events))
+            lines.append(str(self.events))
         if self.broken:
-            found.append(f"Safety rules were broken in {self.broken}.")
+            lines.append(f"Safety rules were broken in {self.broken}.")
         for name in covariates_of(self.study, self.view.part)[1] if self.view else ():
-            found.append(
+            lines.append(
                 f"The answer is not adjusted for {name}: over these persons its mean is more than "
                 "five standard errors off zero."
             )
         if tuning := tuning_warning(self.manifest):
-            found.append(tuning)
+            lines.append(tuning)
         if self.manifest.get("versions", {}).get("dirty"):
-            found.append("The program that made the runs had changes that were not committed.")
-        return found
+            lines.append("The program that made the runs had changes that were not committed.")
+        return lines
 
 
 def few_that_weigh(finding: Finding, view: StudyView) -> str:
@@ -239,11 +245,13 @@ def in_context(reading: ResultsReading) -> Finding | None:
     stops = reading.robustness.stops if reading.robustness is not None else ()
     others = [r for s in stops if s.level == finding.levels[stop] for r in s.others]
     bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
-    found = [(float(b.mean[stop]), float(b.low[stop]), float(b.high[stop])) for b in bands]
+    differences = [(float(b.mean[stop]), float(b.low[stop]), float(b.high[stop])) for b in bands]
     return replace(
         finding,
         models=_together(finding.mean[stop], [(r.mean, r.low, r.high) for r in others]),
-        elsewhere=_together(finding.mean[stop], [each for each in found if np.isfinite(each[0])]),
+        elsewhere=_together(
+            finding.mean[stop], [each for each in differences if np.isfinite(each[0])]
+        ),
         only_model=only_model(reading, finding.part),
         useful=useful_counts(view),
     )
@@ -259,17 +267,17 @@ def only_model(reading: ResultsReading, part: str) -> str:
     return f"strategy {level_name(STRATEGY, strategy)}"
 
 
-def _together(own: float, found: list[tuple[float, float, float]]) -> OtherRuns | None:
+def _together(own: float, differences: list[tuple[float, float, float]]) -> OtherRuns | None:
     """Return the outer limits of intervals, and the range of their means; None without any."""
-    if not found:
+    if not differences:
         return None
-    means, lows, highs = zip(*found, strict=True)
+    means, lows, highs = zip(*differences, strict=True)
     return OtherRuns(
         low=min(lows),
         high=max(highs),
         means=(min(means), max(means)),
-        count=len(found),
-        turns=any(high < 0 if own > 0 else low > 0 for _, low, high in found),
+        count=len(differences),
+        turns=any(high < 0 if own > 0 else low > 0 for _, low, high in differences),
     )
 
 

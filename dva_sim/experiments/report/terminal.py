@@ -83,8 +83,10 @@ def show_table(results: Results, name: str, rows: int, console: Console) -> None
         ConfigError: no such table.
     """
     frame = results.table(name)
-    shown = [[plain(values[row]) for values in frame.values()] for row in range(frame.rows)[:rows]]
-    print_table(list(frame), shown, console, len(results.factors))
+    rows_shown = [
+        [plain(values[row]) for values in frame.values()] for row in range(frame.rows)[:rows]
+    ]
+    print_table(list(frame), rows_shown, console, len(results.factors))
     if frame.rows > rows:
         console.print(f"... and {frame.rows - rows} more rows", soft_wrap=True)
 

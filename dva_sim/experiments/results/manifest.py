@@ -135,11 +135,11 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
         status = Status.model_validate(manifest["status"])
         if "partial" in manifest:
             why = ("the study is not finished", *status.why)
-            found = {"kind": "exploratory", "why": why, "reproducible": False}
-            status = status.model_copy(update=found)
+            exploratory = {"kind": "exploratory", "why": why, "reproducible": False}
+            status = status.model_copy(update=exploratory)
         return _judged_again(_without(manifest.get("failures", []), status))
-    given = manifest.get("set", [])  # each a pair, or a list of its words
-    changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in given]
+    pairs = manifest.get("set", [])  # each a pair, or a list of its words
+    changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in pairs]
     if not changes:
         return Status(kind="declared")
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))

@@ -93,10 +93,10 @@ def _meaning(
         return DESIGN[name]
     if name in added:
         return str(added[name]["meaning"])
-    known = {model: meaning for model in models if (meaning := _of_model(model, table, name))}
-    if len(set(known.values())) <= 1:
-        return next(iter(known.values()), "")
-    return "; ".join(f"{model}: {meaning}" for model, meaning in known.items())
+    meanings = {model: meaning for model in models if (meaning := _of_model(model, table, name))}
+    if len(set(meanings.values())) <= 1:
+        return next(iter(meanings.values()), "")
+    return "; ".join(f"{model}: {meaning}" for model, meaning in meanings.items())
 
 
 def _of_model(model: str, table: str, name: str) -> str:
@@ -313,8 +313,8 @@ def checked_manifest(manifest: Any, file: Path) -> dict[str, Any]:
     try:
         _Manifest.model_validate(manifest)
     except ValidationError as problems:
-        found = problems.errors(include_url=False)
-        if faults := [fault for fault in found if fault["type"] != "extra_forbidden"]:
+        errors = problems.errors(include_url=False)
+        if faults := [fault for fault in errors if fault["type"] != "extra_forbidden"]:
             text, _ = first_mistake(_Manifest, manifest, faults)
             raise ConfigError(f"is damaged: {text}", file) from None
     return manifest
@@ -374,31 +374,31 @@ class Results:
     @property
     def partial(self) -> str:
         """Remark on how much of an unfinished study is there; empty if complete."""
-        found = self.manifest.get("partial")
-        if found is None:
+        gaps = self.manifest.get("partial")
+        if gaps is None:
             return ""
-        missing = f"{text}. " if (text := missing_tables(found.get("missing", {}))) else ""
-        if "until_s" in found:
+        missing = f"{text}. " if (text := missing_tables(gaps.get("missing", {}))) else ""
+        if "until_s" in gaps:
             return (
                 f"Partial: {missing}The run goes on; what follows is of its first "
-                f"{found['until_s']:.0f} s."
+                f"{gaps['until_s']:.0f} s."
             )
         if missing:
             return f"Partial: {missing.strip()}"
         persons = self.study["persons"]
         return (
-            f"Partial: {found['done']} of {found['of']} runs are done. What follows rests on the "
-            f"{found['persons']} of {persons} persons who have all of theirs, and will change."
+            f"Partial: {gaps['done']} of {gaps['of']} runs are done. What follows rests on the "
+            f"{gaps['persons']} of {persons} persons who have all of theirs, and will change."
         )
 
     @property
     def machine(self) -> dict[str, Any]:
         """Times, costs and machine; nothing where they have not come along."""
         try:
-            found = json.loads((self.folder / MACHINE).read_text(encoding="utf-8"))
+            machine = json.loads((self.folder / MACHINE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return {}
-        return found if isinstance(found, dict) else {}
+        return machine if isinstance(machine, dict) else {}
 
     @property
     def failures(self) -> list[dict[str, Any]]:
@@ -489,8 +489,8 @@ class Results:
         Raises:
             ConfigError: no such table, or a damaged file.
         """
-        wanted = "*" if columns is None else ", ".join(map(quoted, columns))
-        return self._read(name, wanted, "" if part is None else "WHERE part = ?", part)
+        selection = "*" if columns is None else ", ".join(map(quoted, columns))
+        return self._read(name, selection, "" if part is None else "WHERE part = ?", part)
 
     def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
         import duckdb
@@ -500,10 +500,10 @@ class Results:
         try:
             with _database().cursor() as cursor:
                 query = f"SELECT {columns} FROM read_parquet(?) {rows}"
-                found = cursor.execute(query, values).fetchnumpy()
+                arrays = cursor.execute(query, values).fetchnumpy()
         except duckdb.Error as error:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
-        return Frame({key: without_mask(column) for key, column in found.items()})
+        return Frame({key: without_mask(column) for key, column in arrays.items()})
 
     @property
     def _tables(self) -> Path:

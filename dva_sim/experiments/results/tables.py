@@ -176,8 +176,8 @@ class _Table:
         self._waiting = self._waiting[_BATCH_ROWS:]
         columns = dict.fromkeys(chain(self._seen, *batch))
         values = {column: [row.get(column) for row in batch] for column in columns}
-        for column, found in values.items():
-            self._seen.setdefault(column, set()).update(map(type, found))
+        for column, cells in values.items():
+            self._seen.setdefault(column, set()).update(map(type, cells))
         kinds = {column: _sql_type(types) for column, types in self._seen.items()}
         if not self._kinds:
             text = ", ".join(f"{quoted(column)} {kind}" for column, kind in kinds.items())

@@ -44,12 +44,12 @@ def compared_factors(study: Study) -> dict[str, Sequence[Level]]:
     design = study.design
     zipped = tuple(design.zip or ()) if design is not None else ()
     aside = {POINT, *zipped[1:]}
-    kept: dict[str, Sequence[Level]] = {
+    compared: dict[str, Sequence[Level]] = {
         name: levels for name, levels in study.factors.items() if name not in aside
     }
     rows = len(study.listed_rows)
-    grid = math.prod(map(len, kept.values()))
-    return {"row": range(rows)} if 2 * rows < grid and rows else kept
+    grid = math.prod(map(len, compared.values()))
+    return {"row": range(rows)} if 2 * rows < grid and rows else compared
 
 
 def why_unanswered(study: Study) -> Iterator[str]:
@@ -128,11 +128,11 @@ def of_few_persons(persons: int) -> str:
     """Describe the coverage of a band of a few persons; empty with enough."""
     if persons >= ENOUGH:
         return ""
-    known = max((count for count in OF_BANDS if count <= persons), default=min(OF_BANDS))
-    beyond = min(count for count in OF_BANDS if count > known)
+    tabulated = max((count for count in OF_BANDS if count <= persons), default=min(OF_BANDS))
+    beyond = min(count for count in OF_BANDS if count > tabulated)
     return (
-        f"with {known} to {beyond - 1} persons a 95 % band over six levels holds "
-        f"{coverage_in_words(OF_BANDS[known])}"
+        f"with {tabulated} to {beyond - 1} persons a 95 % band over six levels holds "
+        f"{coverage_in_words(OF_BANDS[tabulated])}"
     )
 
 

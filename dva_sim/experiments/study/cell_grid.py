@@ -187,12 +187,12 @@ def refuse_unknown_measures(inputs: StudyInputs) -> None:
     for path, part, measure in _asked_measures(study):
         source = inputs.scenarios[part]
         own = inputs.measures_of(str(source.data.get("model", "full")))
-        known = [*model_of(source).measures(), *own]
-        if measure in COVARIATES and measure not in known:
+        measures = [*model_of(source).measures(), *own]
+        if measure in COVARIATES and measure not in measures:
             problem = f"{measure!r} is measured where the key 'measures' names it"
             raise study.error(problem, path)
-        if measure not in known:
-            raise study.error(unknown("measure", measure, known), path)
+        if measure not in measures:
+            raise study.error(unknown("measure", measure, measures), path)
 
 
 def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]) -> None:
@@ -214,8 +214,8 @@ def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
         for number, covariate in enumerate(study.covariates):
             for name in multiplied(covariate):
                 yield ("covariates", number), study.answer.part, name
-    for name, asked in study.comparisons.items():
-        yield ("comparisons", name, "measure"), asked.part, asked.measure
+    for name, contrast in study.comparisons.items():
+        yield ("comparisons", name, "measure"), contrast.part, contrast.measure
     if study.tuning is not None:
         yield ("tuning", "measure"), study.tuning.part, study.tuning.measure
     if study.stop is not None and study.stop.part and study.stop.measure:
@@ -250,16 +250,16 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
     draws = _draws(study, teams)
     # Persons of one cluster follow each other, so that no two clusters share an operator; repeats
     # have the persons of the part that they repeat.
-    found = []
+    study_jobs = []
     for cell in every:
         team = teams[_source_of(study, cell.part)]
         play = partial(model_for(cell.scenario).played_by, cell.scenario)
         scenarios = {person: play(person * team) for person, _, _ in draws[cell.part]}
-        found += [
+        study_jobs += [
             StudyJob(cell.part, cell.cell, cell.levels, *draw, cell.config, scenarios[draw[0]])
             for draw in draws[cell.part]
         ]
-    return found
+    return study_jobs
 
 
 def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
@@ -404,25 +404,25 @@ def _source_of(study: Study, part: str) -> str:
 
 def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Let a policy or a table of events in a file beside the study be found from anywhere."""
-    found = dict(changes)
+    with_paths = dict(changes)
     for key in _IN_FILES & changes.keys():
         part, _, inner = key.partition(".")
         named = {part: {inner: changes[key]} if inner else copy.deepcopy(changes[key])}
         scenarios.locate_files(named, [folder])
-        found[key] = named[part][inner] if inner else named[part]
-    return found
+        with_paths[key] = named[part][inner] if inner else named[part]
+    return with_paths
 
 
 def _draws(study: Study, parts: Iterable[str]) -> dict[str, list[tuple[int, int, int]]]:
     """Return the person, trial and seed of each run in a cell of every part, in order."""
-    found = {}
+    draws = {}
     for name in parts:
         persons, trials, part = _size(study, name)
-        found[name] = [
+        draws[name] = [
             (person, trial, derive_seed(study.seed, part, person, trial))
             for person, trial in itertools.product(range(persons), range(trials))
         ]
-    return found
+    return draws
 
 
 def _size(study: Study, name: str) -> tuple[int, int, str]:

@@ -52,10 +52,10 @@ class Bands(Config):
     @field_validator("bands")
     @classmethod
     def _are_of_traits(cls, value: dict[str, Range]) -> dict[str, Range]:
-        known = Population().traits
+        traits = Population().traits
         for name, (low, _) in value.items():
-            if name not in known:
-                raise ValueError(f"no trait {name!r}; traits: {', '.join(known)}")
+            if name not in traits:
+                raise ValueError(f"no trait {name!r}; traits: {', '.join(traits)}")
             if low <= 0:
                 raise ValueError(f"band of {name!r} should be above zero, not from {low:g}")
         return value

@@ -131,7 +131,7 @@ def opened(load: Callable[[], Document]) -> Document | None:
         return None
 
 
-def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError | None:
+def of_other_kind(document: Document, command: str, expected: str) -> ConfigError | None:
     """Return the error for a file of another kind than a command takes.
 
     None if it fits or is unknown.
@@ -139,15 +139,15 @@ def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError 
     Args:
         document: The file.
         command: Command that takes files of the right kind.
-        wanted: Name of the right kind.
+        expected: Name of the right kind.
     """
     folder = document.file.resolve().parent
     if folder.as_posix().endswith(EVIDENCE):
         validate = f"dva-sim validate {document.file.stem.partition('-')[0]}"
-        return ConfigError(f"is evidence, not a {wanted}; try: {validate}", document.file)
+        return ConfigError(f"is evidence, not a {expected}; try: {validate}", document.file)
     kind = recognise(document)
     if kind is None or kind.command == command:
         return None
-    given = f"; try: {kind.command} {document.file}" if kind.command else ""
+    suggestion = f"; try: {kind.command} {document.file}" if kind.command else ""
     article = "an" if kind.name[0] in "aeiou" else "a"
-    return ConfigError(f"is {article} {kind.name}, not a {wanted}{given}", document.file)
+    return ConfigError(f"is {article} {kind.name}, not a {expected}{suggestion}", document.file)

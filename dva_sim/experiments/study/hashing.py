@@ -77,12 +77,12 @@ def _files_of(name: str) -> Iterator[tuple[str, Path]]:
     """
     path = Path(file_in(name))
     shipped = (root / _TRACES / path for root in resources.roots())
-    found = next(filter(resources.is_file, (path, *shipped)), None)
-    if found is None:
+    file = next(filter(resources.is_file, (path, *shipped)), None)
+    if file is None:
         return
-    yield name, found
-    for other in with_named_files(found)[1:]:
-        yield f"{name}: {os.path.relpath(other, found.parent)}", other
+    yield name, file
+    for other in with_named_files(file)[1:]:
+        yield f"{name}: {os.path.relpath(other, file.parent)}", other
 
 
 # Reports may change without making old runs stale; what measures and simulates may not.

@@ -24,17 +24,17 @@ def own_measures(study: Study) -> dict[str, RunMeasure]:
     Raises:
         ConfigError: one cannot be had, or has the name of another column.
     """
-    found: dict[str, RunMeasure] = {}
+    measures: dict[str, RunMeasure] = {}
     for number, name in enumerate(study.measures):
         try:
             located = PLUGINS.located(name, study.folder)
-            found[located] = load_measure(located)
-            refuse_twins(found.values(), {*DESIGN, *study.factors, *measured_names()})
+            measures[located] = load_measure(located)
+            refuse_twins(measures.values(), {*DESIGN, *study.factors, *measured_names()})
         except ConfigError as error:
             if error.file is not None:
                 raise
             raise study.error(error.problem, ("measures", number)) from None
-    return found
+    return measures
 
 
 def own_columns(measures: Iterable[RunMeasure]) -> dict[str, Any]:

@@ -370,6 +370,6 @@ def _table_of(study: Study) -> Document | None:
     return read_table(path)
 
 
-def _tell_first(study: Study, found: Iterable[validation.Problem]) -> None:
-    for problem, path in found:
+def _tell_first(study: Study, problems: Iterable[validation.Problem]) -> None:
+    for problem, path in problems:
         raise study.error(problem, path)

@@ -54,8 +54,8 @@ def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> C
     try:
         make(changes)
     except ConfigError:
-        found = error if error.keys else blame(error, changes, make, document)
-        return set_by(pairs, found) if found.keys else blamed_in(document, found)
+        mistake = error if error.keys else blame(error, changes, make, document)
+        return set_by(pairs, mistake) if mistake.keys else blamed_in(document, mistake)
     return error  # it can be run: the mistake is in what else was asked for
 
 

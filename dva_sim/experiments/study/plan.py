@@ -49,21 +49,21 @@ class StudyPlan:
     measures: Mapping[str, RunMeasure]
 
     @classmethod
-    def of(cls, asked: Study | StudyPlan) -> StudyPlan:
+    def of(cls, study: Study | StudyPlan) -> StudyPlan:
         """Return the plan of a study; a plan is its own.
 
         Raises:
             ConfigError: a file that cannot be read, or a cell that is not valid.
         """
-        if isinstance(asked, StudyPlan):
-            return asked
-        inputs = StudyInputs(asked)
-        cells = cell_grid.cells(asked, inputs)
+        if isinstance(study, StudyPlan):
+            return study
+        inputs = StudyInputs(study)
+        cells = cell_grid.cells(study, inputs)
         return cls(
-            study=asked,
-            scenarios={part: cell_grid.base_scenario(inputs, part) for part in asked.parts},
+            study=study,
+            scenarios={part: cell_grid.base_scenario(inputs, part) for part in study.parts},
             cells=cells,
-            rehearsed=cell_grid.to_rehearse(asked, cells, inputs),
+            rehearsed=cell_grid.to_rehearse(study, cells, inputs),
             parameter_sets=inputs.parameter_sets,
             tuned=inputs.tuned,
             basis=None if inputs.tuned is None else cell_grid.basis_of_tuning(inputs),

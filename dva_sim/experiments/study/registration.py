@@ -101,13 +101,13 @@ def register(study: Study, again: bool = False) -> str:
     """
     if not study.hypotheses:
         raise study.error("nothing to register: no key 'hypotheses'", ())
-    for key, asked in (("stop", study.stop), ("budget_s", study.budget_s)):
-        if asked is not None:
+    for key, value in (("stop", study.stop), ("budget_s", study.budget_s)):
+        if value is not None:
             problem = f"a registered study has a fixed number of persons; leave {key!r} out"
             raise study.error(problem, (key,))
     path = study.folder / f"{study.file.stem}{REGISTRATION}"
-    found = registration_of(study)
-    if found is not None and not again:
+    registered = registration_of(study)
+    if registered is not None and not again:
         raise ConfigError(f"{path} already exists; --again replaces it, and the report will say so")
     made = Preregistration(
         study=study.file.stem,
@@ -115,12 +115,12 @@ def register(study: Study, again: bool = False) -> str:
         made_with=f"{__version__} {fingerprint()}",
         judged_with=fingerprint_of_judges(),
         full=study.version == "full",
-        earlier=(*found.earlier, found.hash) if found is not None else (),
+        earlier=(*registered.earlier, registered.hash) if registered is not None else (),
         plan=plan_of(study),
     )
     made = made.model_copy(update={"hash": made.proper_hash})
     cell_grid.cells(study.model_copy(update={"seed": made.seed}))  # its points are valid, too
-    _write(path, _as_text(made), found is not None)
+    _write(path, _as_text(made), registered is not None)
     names = ", ".join(study.hypotheses)
     size = f"{study.persons} persons x {study.replications}"
     return f"Registered {names} on {size} trials, in {path}\nRun unchanged, it confirms or refutes"
@@ -153,10 +153,12 @@ def plan_of(study: Study) -> dict[str, Any]:
         name: f"{Path(name).name} {content}"
         for name, content in inputs((cell.scenario for cell in cells), files_read.measures).items()
     }
-    asked = {key: value for key, value in nobody.asked().items() if key not in _OPEN}
-    asked["factors"] = {f: levels for f, levels in asked["factors"].items() if f != POINT}
+    description = {key: value for key, value in nobody.asked().items() if key not in _OPEN}
+    description["factors"] = {
+        f: levels for f, levels in description["factors"].items() if f != POINT
+    }
     if study.listed_rows:
-        asked["design"]["rows"] = stable_hash(study.listed_rows)
+        description["design"]["rows"] = stable_hash(study.listed_rows)
     resolved = {
         "scenarios": {
             part: _hash_of(cell_grid.base_scenario(files_read, part), files) for part in study.parts
@@ -164,7 +166,7 @@ def plan_of(study: Study) -> dict[str, Any]:
         "cells": stable_hash([_hash_of(cell.scenario, files) for cell in cells]),
         "inputs": sorted(files.values()),
     }
-    plan: dict[str, Any] = json.loads(json.dumps(asked | resolved))
+    plan: dict[str, Any] = json.loads(json.dumps(description | resolved))
     return {key: value for key, value in plan.items() if value not in (None, [], {})}
 
 
@@ -174,19 +176,19 @@ def settled(study: Study) -> Study:
     Raises:
         ConfigError: the registration cannot be read, or the study has a cell that is not valid.
     """
-    found = registration_of(study)
-    why = [*_liberties(study), *(departures(found, study) if found is not None else ())]
-    confirms = found is not None and not why
-    if found is not None:
-        why += _remarks(found, study)
-    kept = study.model_copy(update={"seed": found.seed} if found and confirms else {})
-    kept._status = Status(
+    registered = registration_of(study)
+    why = [*_liberties(study), *(departures(registered, study) if registered is not None else ())]
+    confirms = registered is not None and not why
+    if registered is not None:
+        why += _remarks(registered, study)
+    copy = study.model_copy(update={"seed": registered.seed} if registered and confirms else {})
+    copy._status = Status(
         kind="confirmatory" if confirms else "exploratory" if why else "declared",
         why=tuple(why),
         reproducible=study.budget_s is None,
-        registration=found.model_dump(mode="json") if found is not None else None,
+        registration=registered.model_dump(mode="json") if registered is not None else None,
     )
-    return kept
+    return copy
 
 
 def _liberties(study: Study) -> Iterator[str]:
@@ -200,30 +202,31 @@ def _liberties(study: Study) -> Iterator[str]:
         yield f"how many persons are simulated depends on the clock, {study.budget_s:g} s"
 
 
-def departures(found: Preregistration, study: Study) -> Iterator[str]:
+def departures(registered: Preregistration, study: Study) -> Iterator[str]:
     """Yield in what a study is not what was registered."""
-    if found.hash != found.proper_hash:
+    if registered.hash != registered.proper_hash:
         yield "the registration was edited: its hash is not that of what it fixes"
     now = plan_of(study)
-    keys = [key for key in {**found.plan, **now} if found.plan.get(key) != now.get(key)]
+    keys = [key for key in {**registered.plan, **now} if registered.plan.get(key) != now.get(key)]
     for key in (key for key in keys if key in ("persons", "replications")):
-        yield f"{found.plan.get(key)} {key} were registered, not {now[key]}"
+        yield f"{registered.plan.get(key)} {key} were registered, not {now[key]}"
     others = [key for key in keys if key not in ("persons", "replications")]
     if others:
         yield f"other than registered: {', '.join(others)}"
 
 
-def _remarks(found: Preregistration, study: Study) -> Iterator[str]:
+def _remarks(registered: Preregistration, study: Study) -> Iterator[str]:
     """Yield remarks for the reader that are not departures."""
-    if found.study != study.file.stem:
-        yield f"it was registered as {found.study!r}"
-    if found.question not in ("", study.question):
-        yield f"its question was worded otherwise when it was registered: {found.question!r}"
+    if registered.study != study.file.stem:
+        yield f"it was registered as {registered.study!r}"
+    if registered.question not in ("", study.question):
+        yield f"its question was worded otherwise when it was registered: {registered.question!r}"
     now = f"{__version__} {fingerprint()}"
-    if found.made_with != now:
-        yield f"the program is another than when it was registered ({found.made_with}; now {now})"
-    if found.earlier:
-        times = "once" if len(found.earlier) == 1 else f"{len(found.earlier)} times"
+    if registered.made_with != now:
+        made_with = f"({registered.made_with}; now {now})"
+        yield f"the program is another than when it was registered {made_with}"
+    if registered.earlier:
+        times = "once" if len(registered.earlier) == 1 else f"{len(registered.earlier)} times"
         yield f"it had been registered {times} before, otherwise"
 
 

@@ -220,8 +220,8 @@ class Study(Config):
         """Return the last pair of `--set` that gives what stands at a key of the study."""
         key = ".".join(map(str, path))
         for pair in reversed(self.settings):
-            given = pair.partition("=")[0].strip()
-            if f"{key}.".removeprefix("factors.").startswith(f"{given.removeprefix('factors.')}."):
+            name = pair.partition("=")[0].strip()
+            if f"{key}.".removeprefix("factors.").startswith(f"{name.removeprefix('factors.')}."):
                 return pair
         return None
 

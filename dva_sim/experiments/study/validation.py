@@ -60,10 +60,10 @@ def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Problem]:
         elif name in names[:index]:
             yield f"{name!r} appears twice", path
         elif names[0] in study.factors:
-            wanted = len(study.factors[names[0]])
+            expected = len(study.factors[names[0]])
             count = len(study.factors[name])
-            if count != wanted:
-                yield f"{name!r} should have {wanted} levels as {names[0]!r}, not {count}", path
+            if count != expected:
+                yield f"{name!r} should have {expected} levels as {names[0]!r}, not {count}", path
 
 
 def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Problem]:
@@ -147,9 +147,9 @@ def of_size(study: Study) -> Iterator[Problem]:
         problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
         yield problem, ("design",) if has_points else ("factors",)
     elif (runs := runs_of(study)) > MOST_RUNS:
-        asked = "most_persons" if study.most_persons > study.persons else "persons"
+        key = "most_persons" if study.most_persons > study.persons else "persons"
         is_trials = study.replications > study.most_persons
-        path: KeyPath = ("stop", asked) if asked == "most_persons" else (asked,)
+        path: KeyPath = ("stop", key) if key == "most_persons" else (key,)
         problem = f"there would be {runs:,} runs, more than {MOST_RUNS:,}"
         fewer = "have fewer persons, replications or levels"
         yield f"{problem}; {fewer}", ("replications",) if is_trials else path
@@ -223,13 +223,13 @@ def kept_claims(study: Study) -> Study:
         if not any(_faults_of_contrast(study, comparison, ()))
     }
     rest = study.model_copy(update=lost)
-    kept = {
+    hypotheses = {
         name: claim
         for name, claim in rest.hypotheses.items()
         if not any(_faults_of_hypothesis(rest, name))
         and (answer == study.answer or claim.comparison != ANSWER)
     }
-    return rest.model_copy(update={"hypotheses": kept})
+    return rest.model_copy(update={"hypotheses": hypotheses})
 
 
 def _kept_answer(study: Study) -> Contrast | None:
@@ -261,29 +261,29 @@ def _kept_map(study: Study) -> MapRule | None:
         return None
     gone = {path[-1] for _, path in of_map(study) if path[:2] == ("map", "notes")}
     notes = {level: text for level, text in study.map.notes.items() if level not in gone}
-    kept = study.map.model_copy(update={"notes": notes})
-    return None if any(of_map(study.model_copy(update={"map": kept}))) else kept
+    changed = study.map.model_copy(update={"notes": notes})
+    return None if any(of_map(study.model_copy(update={"map": changed}))) else changed
 
 
 def lost_claims(study: Study) -> list[str]:
     """Return claims that the changed factors or levels no longer allow, one sentence each."""
-    kept = kept_claims(study)
-    lost = [f"{_fate_of_answer(kept)}: {problem}" for problem, _ in of_answer(study)][:1]
+    smaller = kept_claims(study)
+    lost = [f"{_fate_of_answer(smaller)}: {problem}" for problem, _ in of_answer(study)][:1]
     for what, declared, left in (
-        ("comparison", study.comparisons, kept.comparisons),
-        ("hypothesis", study.hypotheses, kept.hypotheses),
+        ("comparison", study.comparisons, smaller.comparisons),
+        ("hypothesis", study.hypotheses, smaller.hypotheses),
     ):
         lost += [f"{what} {name!r} is left out" for name in declared if name not in left]
-    if study.map is not None and kept.map is None:
+    if study.map is not None and smaller.map is None:
         lost.append("the map will not be drawn")
     return lost
 
 
-def _fate_of_answer(kept: Study) -> str:
-    if kept.answer is None:
+def _fate_of_answer(smaller: Study) -> str:
+    if smaller.answer is None:
         return "the answer will not be computed"
-    first, second = kept.answer.contrast
-    return f"the answer compares {kept.answer.factor} {first} with {second}, the only two left"
+    first, second = smaller.answer.contrast
+    return f"the answer compares {smaller.answer.factor} {first} with {second}, the only two left"
 
 
 def of_answer(study: Study) -> Iterator[Problem]:
@@ -292,22 +292,22 @@ def of_answer(study: Study) -> Iterator[Problem]:
         yield from _faults_of_contrast(study, study.answer, (ANSWER,))
 
 
-def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Problem]:
-    yield from _fault_of_part(study, (*path, "part"), asked.part)
-    yield from _fault_of_level(study, (*path, "factor"), asked.factor, ())
-    if asked.factor in study.factors:
-        yield from _fault_of_level(study, (*path, "contrast"), asked.factor, asked.contrast)
+def _faults_of_contrast(study: Study, contrast: Contrast, path: KeyPath) -> Iterator[Problem]:
+    yield from _fault_of_part(study, (*path, "part"), contrast.part)
+    yield from _fault_of_level(study, (*path, "factor"), contrast.factor, ())
+    if contrast.factor in study.factors:
+        yield from _fault_of_level(study, (*path, "contrast"), contrast.factor, contrast.contrast)
     ranges = study.design.ranges if study.design is not None else {}
-    if asked.over is not None and asked.over not in ranges:
-        yield from _fault_of_level(study, (*path, "over"), asked.over, ())
-    yield from _faults_of_places(study, (*path, "within"), asked.within)
-    if asked.contrast[0] == asked.contrast[1]:
+    if contrast.over is not None and contrast.over not in ranges:
+        yield from _fault_of_level(study, (*path, "over"), contrast.over, ())
+    yield from _faults_of_places(study, (*path, "within"), contrast.within)
+    if contrast.contrast[0] == contrast.contrast[1]:
         yield "contrast compares a level with itself", (*path, "contrast")
-    if asked.over is None or path != (ANSWER,):
+    if contrast.over is None or path != (ANSWER,):
         # The levels of all other factors have to be given, or what is meant is open.
-        given = {asked.factor, asked.over, *asked.within, *factors_in_rows(study)}
+        named = {contrast.factor, contrast.over, *contrast.within, *factors_in_rows(study)}
         for name, levels in study.factors.items():
-            if len(levels) > 1 and name not in given:
+            if len(levels) > 1 and name not in named:
                 yield f"should run over {name!r} or be within a level of it", path
 
 
@@ -315,11 +315,11 @@ def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
     hypothesis = study.hypotheses[name]
     path = ("hypotheses", name)
     yield from _fault_of_comparison(study, (*path, "comparison"), hypothesis.comparison)
-    if (asked := study.contrasts.get(hypothesis.comparison)) is None:
+    if (contrast := study.contrasts.get(hypothesis.comparison)) is None:
         return
     yield from _faults_of_places(study, (*path, "at"), hypothesis.at)
-    if asked.factor in hypothesis.at:
-        yield f"{asked.factor!r} is what is compared", (*path, "at", asked.factor)
+    if contrast.factor in hypothesis.at:
+        yield f"{contrast.factor!r} is what is compared", (*path, "at", contrast.factor)
 
 
 def of_stop(study: Study) -> Iterator[Problem]:

@@ -120,9 +120,9 @@ def _wait_for(
             if code := far.process.wait():
                 tell(f"the far command has ended with exit code {code}")
         if signals.fileno() in ready:
-            asked = signals.recv(64)
-            if deadline is not None or len(asked) > 1:
+            signal_bytes = signals.recv(64)
+            if deadline is not None or len(signal_bytes) > 1:
                 return 0.0
             for command in (near, far):
-                command.process.send_signal(asked[0])
+                command.process.send_signal(signal_bytes[0])
             deadline = time.monotonic() + GRACE_S

@@ -32,10 +32,10 @@ class Durations:
 
     def quantile(self, share: float) -> float:
         """Return the duration [s] that a share does not exceed, within one percent; nan if none."""
-        wanted = share * self._counts.total()
+        left = share * self._counts.total()
         for step in sorted(self._counts):
-            wanted -= self._counts[step]
-            if wanted <= 0:
+            left -= self._counts[step]
+            if left <= 0:
                 return min(self.longest_s, _LEAST_S * math.exp(step * _STEP))
         return math.nan
 

@@ -113,9 +113,9 @@ class LinkConfig(Config):
                 "delay_law": way.law is not None,
                 "delay_log": way.delay_log is not None,
             }
-            given = [key for key, is_given in spread.items() if is_given]
-            if len(given) > 1:
-                raise ValueError(f"{given[0]} and {given[1]} exclude each other")
+            keys = [key for key, is_given in spread.items() if is_given]
+            if len(keys) > 1:
+                raise ValueError(f"{keys[0]} and {keys[1]} exclude each other")
             if way.law is not None:
                 way.law.check(way.delay_s)
             if way.bursts is not None:

@@ -250,13 +250,13 @@ class _Run:
 
     def log(self) -> DelayLog:
         """Return all requests from the first that was replied to, in order."""
-        known = np.array(sorted(self.replies))
-        sent = np.maximum.accumulate([self.replies[n][0] for n in known])
-        numbers = np.arange(known[0], self.newest + 1)
-        step = (sent[-1] - sent[0]) / max(1, known[-1] - known[0])
-        times = np.interp(numbers, known, sent) + step * np.maximum(0, numbers - known[-1])
+        answered = np.array(sorted(self.replies))
+        sent = np.maximum.accumulate([self.replies[n][0] for n in answered])
+        numbers = np.arange(answered[0], self.newest + 1)
+        step = (sent[-1] - sent[0]) / max(1, answered[-1] - answered[0])
+        times = np.interp(numbers, answered, sent) + step * np.maximum(0, numbers - answered[-1])
         delays = np.full(len(numbers), math.nan)
-        delays[known - known[0]] = [self.replies[n][1] for n in known]
+        delays[answered - answered[0]] = [self.replies[n][1] for n in answered]
         return DelayLog(times, delays)
 
 

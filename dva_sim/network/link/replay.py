@@ -58,6 +58,6 @@ def moments_of(log: DelayLog) -> tuple[float, float]:
 
 def _filled(delays: Floats) -> Floats:
     """Return delays with the last known one where a probe was lost."""
-    known = np.flatnonzero(~np.isnan(delays))
-    last = np.searchsorted(known, np.arange(len(delays)), side="right") - 1
-    return delays[known[np.maximum(last, 0)]]
+    measured = np.flatnonzero(~np.isnan(delays))
+    last = np.searchsorted(measured, np.arange(len(delays)), side="right") - 1
+    return delays[measured[np.maximum(last, 0)]]

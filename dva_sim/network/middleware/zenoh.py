@@ -43,12 +43,12 @@ class ZenohTransport(CommandTransport):
         reliable: bool = True,
         express: bool = False,
     ) -> None:
-        for key, value, known in (
+        for key, value, choices in (
             ("carrier", carrier, ("tcp", "udp")),
             ("congestion", congestion, ("drop", "block")),
         ):
-            if value not in known:
-                raise ConfigError(f"{key} {value!r} should be one of {', '.join(known)}")
+            if value not in choices:
+                raise ConfigError(f"{key} {value!r} should be one of {', '.join(choices)}")
         self.carrier = carrier
         self.congestion = congestion
         self.reliable = reliable

@@ -191,8 +191,8 @@ class TcpEndpoint:
         if arrival is None:
             return
         blocks = tuple(receiver.blocks[:BLOCKS])
-        known = receiver.next, receiver.edge, blocks, duplicate, now, receiver.stamp, pushes
-        self._clock.call_at(arrival, self._other.arrive, start, end, *known)
+        header = receiver.next, receiver.edge, blocks, duplicate, now, receiver.stamp, pushes
+        self._clock.call_at(arrival, self._other.arrive, start, end, *header)
 
     def acknowledge(self) -> None:
         """Send an acknowledgement without data."""

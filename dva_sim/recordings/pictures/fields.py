@@ -105,8 +105,8 @@ class _Contours:
         y = south + (np.arange(rows) + 0.5) * (north - south) / rows
         contours = contour_generator(x, y, raster.values)
         for level, lines in zip(self._levels, self._lines, strict=True):
-            found: Any = contours.lines(level)
-            lines.set_segments(found)
+            segments: Any = contours.lines(level)
+            lines.set_segments(segments)
         return list(self._lines)
 
 

@@ -46,14 +46,14 @@ def find_ffmpeg() -> str:
     try:
         import imageio_ffmpeg
     except ImportError:
-        found = shutil.which("ffmpeg")
+        path = shutil.which("ffmpeg")
     else:
-        found = imageio_ffmpeg.get_ffmpeg_exe()
-    if found is None:
+        path = imageio_ffmpeg.get_ffmpeg_exe()
+    if path is None:
         raise ConfigError(
             "mp4 needs ffmpeg: pip install -e '.[video]', or install ffmpeg, or write a .gif"
         )
-    return found
+    return path
 
 
 def _write_gif(film: Film, path: Path) -> None:
@@ -79,12 +79,12 @@ def _write_gif(film: Film, path: Path) -> None:
 
 def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
     """Yield pictures that change only where one can see it: what stays the same takes no room."""
-    shown = next(frames)
-    yield shown
+    previous = next(frames)
+    yield previous
     for frame in frames:
-        red, green, blue = np.moveaxis(np.abs(frame.astype(np.int16) - shown) >= ALIKE, 2, 0)
-        shown = np.where((red | green | blue)[:, :, None], frame, shown)
-        yield shown
+        red, green, blue = np.moveaxis(np.abs(frame.astype(np.int16) - previous) >= ALIKE, 2, 0)
+        previous = np.where((red | green | blue)[:, :, None], frame, previous)
+        yield previous
 
 
 def _write_mp4(film: Film, path: Path) -> None:

@@ -162,5 +162,5 @@ def _shown(drive: DriveLog, time: float) -> float | None:
     """Return when the picture that the driver looks at was taken, if there is one."""
     if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
         return None
-    shown = [frame for frame in drive.frames if frame.time <= time]
-    return shown[-1].captured if shown and time - shown[-1].time < FRESH else None
+    frames = [frame for frame in drive.frames if frame.time <= time]
+    return frames[-1].captured if frames and time - frames[-1].time < FRESH else None

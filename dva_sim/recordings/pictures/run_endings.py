@@ -38,17 +38,17 @@ class RunVerdict(NamedTuple):
 
 def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:
     """Return the outcome of each run; of two, the earlier one says by how much."""
-    found = [_verdict(run) for run in runs]
-    if len(found) != 2 or not all(verdict.text for verdict in found):
-        return found
-    times = [verdict.time if verdict.good else math.inf for verdict in found]
+    endings = [_verdict(run) for run in runs]
+    if len(endings) != 2 or not all(verdict.text for verdict in endings):
+        return endings
+    times = [verdict.time if verdict.good else math.inf for verdict in endings]
     leads = _lead(*times), _lead(*reversed(times))
-    return [v._replace(ahead=lead) for v, lead in zip(found, leads, strict=True)]
+    return [v._replace(ahead=lead) for v, lead in zip(endings, leads, strict=True)]
 
 
-def decided_at(found: Sequence[RunVerdict]) -> float | None:
+def decided_at(endings: Sequence[RunVerdict]) -> float | None:
     """Return the moment that shows how runs differ: when the first had come to a good end."""
-    return min((verdict.time for verdict in found if verdict.good), default=None)
+    return min((verdict.time for verdict in endings if verdict.good), default=None)
 
 
 def story(runs: Sequence[Playback]) -> list[str]:

@@ -127,11 +127,11 @@ class Scene:
 
     def fix(self, time: float) -> None:
         """Show a moment [s] for good."""
-        shown = {id(artist) for artist in self.show(time)}
+        visible = {id(artist) for artist in self.show(time)}
         children: list[Any] = [*self._ax.get_children(), self._clock]
         for artist in children:
             if artist.get_animated():
-                artist.set(animated=False, visible=id(artist) in shown)
+                artist.set(animated=False, visible=id(artist) in visible)
 
 
 class _Sheet:

@@ -85,17 +85,17 @@ def legend(moments: Iterable[Moments]) -> list[Artist]:
     return handles
 
 
-def _fields(shown: set[str]) -> list[Artist]:
+def _fields(kinds: set[str]) -> list[Artist]:
     handles: list[Artist] = []
-    if "smoke" in shown:
+    if "smoke" in kinds:
         handles.append(Patch(fc=SMOKE, alpha=0.5, label="smoke"))
-    if "heat" in shown:
+    if "heat" in kinds:
         levels = ", ".join(f"{level:g}" for level in HEAT_LEVELS)
         handles.append(Line2D([], [], color=FIRE, lw=1, label=f"heat {levels} kW/m²"))
-    if "gas" in shown:
+    if "gas" in kinds:
         levels = ", ".join(f"{100 * level:.0f}" for level in GAS_LEVELS)
         handles.append(Line2D([], [], color=GAS, lw=1, label=f"gas {levels} % of LEL"))
-    if "water" in shown:
+    if "water" in kinds:
         handles.append(Patch(fc=WATER, alpha=0.5, label="water"))
     return handles
 
@@ -106,5 +106,5 @@ def _dot(shape: str, colour: str, label: str, edge: str = "white") -> Any:
 
 def _order(mode: str) -> tuple[int, str]:
     """Return modes as they are listed above, others after them."""
-    known = [*ROBOT_MODES, *ACTIVITIES]
-    return (known.index(mode) if mode in known else len(known)), mode
+    ordered = [*ROBOT_MODES, *ACTIVITIES]
+    return (ordered.index(mode) if mode in ordered else len(ordered)), mode

@@ -77,8 +77,8 @@ def add_dva(
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
     core = make_core(stage, permissions, number, life)
     if isinstance(core, RegionalDva):
-        kept = {"memory": memory, "keep_events": keep_events}
-        return RegionalDvaAgent(device, core, is_public=stage.attended, **kept)
+        memory_options = {"memory": memory, "keep_events": keep_events}
+        return RegionalDvaAgent(device, core, is_public=stage.attended, **memory_options)
     return DvaAgent(device, core, memory, keep_events, is_public=stage.attended)
 
 

@@ -379,11 +379,11 @@ class DvaAgent:
     def _count_failures(self) -> None:
         """Count what a policy got wrong, and tell of the first time."""
         failures = self.core.counters["policy failed"]
-        known = self._policy_failures
-        if failures > known:
-            self.device.recorder.counters["failed: an answer of a policy"] += failures - known
+        counted = self._policy_failures
+        if failures > counted:
+            self.device.recorder.counters["failed: an answer of a policy"] += failures - counted
             self._policy_failures = failures
-            if not known:
+            if not counted:
                 why = self.core.dispatcher.last_failure
                 self.device.tell(f"its policy failed, so min_eta decides: {why}", "order")
 

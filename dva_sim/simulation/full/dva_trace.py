@@ -56,14 +56,14 @@ class TracedDva:
         permissions = core.sessions.permissions
         draw = permissions.draw
         permissions.draw = lambda: self._kept(draw())
-        kept = None if memory is None else base64.b64encode(memory.copy()).decode()
+        memory_text = None if memory is None else base64.b64encode(memory.copy()).decode()
         start = {
             "dva": DVA,
             "scenario": stage.scenario.model_dump(mode="json"),
             "seed": stage.seed,
             "sessions": permissions.count,
             "most_devices": core.registry.most,
-            "memory": kept,
+            "memory": memory_text,
         }
         sink(json.dumps(start))
 
@@ -148,11 +148,11 @@ class TracedDva:
 
     def _new_roles(self) -> dict[str, Any]:
         """Return the roles of control rooms, if somebody was appointed since the last line."""
-        known = self._core.roles.known
-        if known == self._roles:
+        roles = self._core.roles.known
+        if roles == self._roles:
             return {}
-        self._roles = dict(known)
-        return {"roles": dict(known)}
+        self._roles = dict(roles)
+        return {"roles": dict(roles)}
 
 
 def _nowhere(_: str) -> None:

@@ -223,8 +223,8 @@ class EventLedger:
 
     def waits_for(self, data: bytes) -> bool:
         """Return True for an order of the DVA, or an answer that is waited for."""
-        asked = self._asked or self._called_false
-        return any(what in data for what in _ORDERED) or (bool(asked) and b"<reply>" in data)
+        has_requests = self._asked or self._called_false
+        return any(what in data for what in _ORDERED) or (bool(has_requests) and b"<reply>" in data)
 
     def says(self, message: m.Message | None) -> None:
         """Note that the DVA sends an order, or an answer."""
@@ -369,11 +369,11 @@ class EventLedger:
         self._promised = {n: at for n, at in self._promised.items() if n in events.open}
         for number in self._lost.keys() & events.open.keys():
             self._find_again(events.open[number])
-        known = self._open
+        before_by_number = self._open
         self._open = later | {n: (e.kind, e.position) for n, e in events.open.items()}
-        for number in known.keys() & self._open.keys():
+        for number in before_by_number.keys() & self._open.keys():
             kind, place = self._open[number]
-            was, before = known[number]
+            was, before = before_by_number[number]
             if kind != was or (place != before and apart(place, before) > MOVED):
                 yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*events.open.values(), *events.closed.values())
@@ -427,8 +427,8 @@ class EventLedger:
         near = max(self._rules.merge_distance, SAME_SPOT)
         kind = report.kind
         tables = [self._events, *(book._events for book in self._books if book is not self)]
-        known = (e for t in tables for e in (*t.open.values(), *t.closed.values()))
-        same = (e for e in known if e.kind == kind)
+        events = (e for t in tables for e in (*t.open.values(), *t.closed.values()))
+        same = (e for e in events if e.kind == kind)
         return (e for e in same if apart(e.position, report.position) < near)
 
     def _adopt(self, now: float) -> None:
@@ -446,8 +446,8 @@ class EventLedger:
         self._promised[event.number] = 0.0
         word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
         word.went.update(word.ordered.items())
-        found = FOUND.intersection((*event.times, event.state.value))
-        return Seen(found, _in_hand(event), now, now, now, times=dict(event.times))
+        conclusions = FOUND.intersection((*event.times, event.state.value))
+        return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))
 
     def _is_anothers(self, device: str) -> bool:
         """Return True if a device has registered with another DVA since it did with this one."""
@@ -467,9 +467,9 @@ class EventLedger:
         if not all(book._worked_since(self._down_at - TOGETHER) for book in others):
             return True  # that a DVA and its deputy die at once is not promised to be harmless
         tables = [book._events for book in others]
-        known: list[Event | m.EventReport] = [*self._unreplicated]
-        known += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
-        return any(e.kind == kind and apart(e.position, place) < near for e in known)
+        all_events: list[Event | m.EventReport] = [*self._unreplicated]
+        all_events += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
+        return any(e.kind == kind and apart(e.position, place) < near for e in all_events)
 
     def _worked_since(self, time: float) -> bool:
         return not self._was_down and self._back_at < time
@@ -537,8 +537,8 @@ class EventLedger:
         new = self._look(event, old, now)
         rules = self._rules
         for step, when in event.times.items():
-            known = last == -math.inf or (old is not None and old.times.get(step) == when)
-            if not known and not last - STEP_SLACK <= when <= now + STEP_SLACK:
+            is_noted = last == -math.inf or (old is not None and old.times.get(step) == when)
+            if not is_noted and not last - STEP_SLACK <= when <= now + STEP_SLACK:
                 yield "S7", f"event {event.number}: {step} is noted {now - when:.1f} s too late"
         self._seen[event.number] = new
         waits = event.waits_for is not None
@@ -588,19 +588,19 @@ class EventLedger:
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
         """Track waiting: it ends when somebody accepts the event, and restarts on confirmation."""
-        found = FOUND.intersection((*event.times, event.state.value))
-        old = old or Seen(found - FOUND, (), now, now, now)
+        conclusions = FOUND.intersection((*event.times, event.state.value))
+        old = old or Seen(conclusions - FOUND, (), now, now, now)
         word = self._word(event.number)
         hands = _in_hand(event)
-        given = "act_assigned" if hands[:1] == ("act",) else "assigned"
-        if word.freed and hands == old.hands and event.times.get(given) != old.times.get(given):
+        step = "act_assigned" if hands[:1] == ("act",) else "assigned"
+        if word.freed and hands == old.hands and event.times.get(step) != old.times.get(step):
             word.sent_again = True
         if word.sent_again or hands != old.hands:
             word.taken -= word.loose  # the order may still wait in the DVA's queue
         # A DVA that comes back knows of who has set out; who registers again goes on.
         under_way = ("act_departed" if hands[:1] == ("act",) else "departed") in event.times
         taken = bool(word.taken.intersection(hands)) or (bool(hands) and under_way)
-        confirmed = "confirmed" in found - old.found
+        confirmed = "confirmed" in conclusions - old.found
         waits = now if taken or word.busy or confirmed else old.waits
         since = old.since if hands == old.hands and not word.sent_again else now
         debt = self._debt(event, hands, old.debt, now)
@@ -609,7 +609,7 @@ class EventLedger:
             word.reached.add(goes)
         word.busy = word.sent_again = word.freed = False
         return Seen(
-            found,
+            conclusions,
             hands,
             since,
             waits,
@@ -630,9 +630,9 @@ class EventLedger:
         goes = hands[-1] or who
         step = ("act_departed" if hands[0] == "act" else "departed") in event.times
         place = self._place_of(goes)
-        known = (old.who, old.step) == (who, step) and not word.sent_again
+        is_same = (old.who, old.step) == (who, step) and not word.sent_again
         moved = step and (None in (place, old.place) or _far(place, old.place))
-        return old if known and not moved else Debt(who, step, now, place)
+        return old if is_same and not moved else Debt(who, step, now, place)
 
     def _has_others(self, who: str, number: int) -> bool:
         others = (n for n, word in self._words.items() if who in word.ordered.keys() - word.ended)
@@ -650,9 +650,9 @@ def _far(place: m.Position | None, other: m.Position | None) -> bool:
     return place is not None and other is not None and apart(place, other) >= STIRRED
 
 
-def _keep_newest(kept: dict[Any, Any]) -> None:
-    if len(kept) > MOST_KEPT:
-        del kept[next(iter(kept))]
+def _keep_newest(table: dict[Any, Any]) -> None:
+    if len(table) > MOST_KEPT:
+        del table[next(iter(table))]
 
 
 def _in_hand(event: Event) -> tuple[str | None, ...]:

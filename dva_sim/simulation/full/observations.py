@@ -446,9 +446,9 @@ class FactLog:
     def _note_motions(
         self, now: float, motions: Mapping[str, RobotMotion], at_all: bool = False
     ) -> None:
-        known = self._motions
-        new = {robot: each for robot, each in motions.items() if known.get(robot) != each}
-        known |= new
+        motions_noted = self._motions
+        new = {robot: each for robot, each in motions.items() if motions_noted.get(robot) != each}
+        motions_noted |= new
         if new or at_all:
             self._put(MotionNews(now, new))
 
@@ -514,15 +514,15 @@ class _EventTableDiff:
         changed = list[dict[str, Any]]()
         every = [(e, _BOTH if n in events.closed else _OPEN) for n, e in events.open.items()]
         every += [(e, _CLOSED) for n, e in events.closed.items() if n not in events.open]
-        known = self._events
+        shown_events = self._events
         self._events = {}
         for event, where in every:
-            shown: tuple[Any, ...] = where, event.state, event.responder, event.operator
-            shown = *shown, event.actor, event.needs_containment, *event.times.items()
-            self._events[event.number] = shown
-            if known.get(event.number) != shown:
+            facts: tuple[Any, ...] = where, event.state, event.responder, event.operator
+            facts = *facts, event.actor, event.needs_containment, *event.times.items()
+            self._events[event.number] = facts
+            if shown_events.get(event.number) != facts:
                 changed.append(event_facts(event, where))
-        gone = [number for number in known if number not in self._events]
+        gone = [number for number in shown_events if number not in self._events]
         counts = {state.value: count for state, count in events.counts.items()}
         rights = list(page.rights)
         news = BookNews(
@@ -583,8 +583,8 @@ class EventTableCopy:
             times=dict(facts["times_s"]),
             **{who: facts[who] for who in _SENT},
         )
-        for where, kept in ((_OPEN, self.events.open), (_CLOSED, self.events.closed)):
+        for where, events in ((_OPEN, self.events.open), (_CLOSED, self.events.closed)):
             if facts["where"] in (where, _BOTH):
-                kept[number] = event
+                events[number] = event
             else:
-                kept.pop(number, None)
+                events.pop(number, None)

@@ -88,9 +88,9 @@ class Field(RunHazards):
 
     def place_of(self, device: str) -> m.Position | None:
         """Return the true position of a robot or guard, by its id."""
-        known = self.robots.get(device)
-        if known is not None:
-            return m.Position(*self.stage.site.frame.to_latlon(known.body.x, known.body.y))
+        robot = self.robots.get(device)
+        if robot is not None:
+            return m.Position(*self.stage.site.frame.to_latlon(robot.body.x, robot.body.y))
         guards = (g for g in self.guards if g.device.id_tag == device)
         places = (self.stage.site.frame.to_latlon(*g.walking.place) for g in guards)
         return next((m.Position(*place) for place in places), None)

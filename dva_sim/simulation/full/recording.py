@@ -194,12 +194,12 @@ def event_about(
 
     Of what only sensors of robots speak for, the robot's place is known, and not its own.
     """
-    known: tuple[float, Event | None] = math.inf, None
+    nearest: tuple[float, Event | None] = math.inf, None
     for event in events:
         at = site.frame.to_xy(event.position.latitude, event.position.longitude)
         gap = math.dist(at, incident.hazard.position)
         felt = event.sources and all(source in robots for source in event.sources)
-        near = gap <= min(known[0], REACH if felt else MERGED_WITHIN)
+        near = gap <= min(nearest[0], REACH if felt else MERGED_WITHIN)
         if event.kind == incident.kind and near:
-            known = gap, event
-    return known[1]
+            nearest = gap, event
+    return nearest[1]

@@ -111,17 +111,17 @@ class RegionalRules:
                 self._reported[source, to, message.message_id] = body
             elif isinstance(body, m.PeerStatus):
                 for each in body.regions:
-                    known, _ = self._epochs.get((to, each.region), (0, now))
-                    if each.epoch > known:
+                    newest, _ = self._epochs.get((to, each.region), (0, now))
+                    if each.epoch > newest:
                         self._epochs[to, each.region] = each.epoch, now
         elif source in self.terms.dvas and isinstance(body, m.Reply):
             if self._registers.pop((to, source, body.answers), ()) is None and body.code == m.OK:
                 self._obeys[to] = source
         elif source in self.terms.dvas and isinstance(body, ORDERS):
             self._ordered[to, source, message.message_id] = Asked(now, self._obeys.get(to))
-        for kept in (self._registers, self._ordered, self._reported):
-            if len(kept) > MOST_KEPT:
-                kept.popitem(last=False)
+        for table in (self._registers, self._ordered, self._reported):
+            if len(table) > MOST_KEPT:
+                table.popitem(last=False)
 
     def sent(self, now: float, source: str, to: str, payload: bytes) -> Iterator[Broken]:
         """Take a message that somebody has sent; yield the rules that it breaks."""
@@ -130,8 +130,8 @@ class RegionalRules:
         elif to in self.terms.dvas and b"<reply>" in payload and self._ordered:
             message = decode_if_valid(payload)
             if message is not None and isinstance(message.body, m.Reply):
-                asked = self._ordered.pop((source, to, message.body.answers), None)
-                own = [] if asked is None else [asked.obeyed, self._obeys.get(source)]
+                order = self._ordered.pop((source, to, message.body.answers), None)
+                own = [] if order is None else [order.obeyed, self._obeys.get(source)]
                 obeyed = [dva for dva in own if dva is not None]
                 if message.body.code == m.OK and obeyed and to not in obeyed:
                     yield "S12", f"obeys {to}, and is registered with {obeyed[-1]}"
@@ -287,13 +287,13 @@ class RegionalRules:
                 yield "S15", f"{what}, which needs that no longer"
 
     def _lasting(
-        self, rule: str, dva: str, found: set[tuple[Any, ...]], now: float
+        self, rule: str, dva: str, conditions: set[tuple[Any, ...]], now: float
     ) -> Iterator[tuple[tuple[Any, ...], float]]:
         """Yield what was found at every page so far, and since when [s]."""
         for key in [key for key in self._since if key[:2] == (rule, dva)]:
-            if key[2:] not in found:
+            if key[2:] not in conditions:
                 del self._since[key]
-        for each in sorted(found, key=str):
+        for each in sorted(conditions, key=str):
             yield each, self._since.setdefault((rule, dva, *each), now)
 
 

@@ -434,10 +434,10 @@ class Run:
 
     def _reception(self, robot: str) -> Reception | None:
         """Return the radio link's quality where a robot was at the last tick of the physics."""
-        known = self.field.robots.get(robot)  # it talks before the next one has been placed
-        if known is None:
+        agent = self.field.robots.get(robot)  # it talks before the next one has been placed
+        if agent is None:
             return None
-        here = self.stage.site.link_quality(known.body.x, known.body.y)
+        here = self.stage.site.link_quality(agent.body.x, agent.body.y)
         return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:

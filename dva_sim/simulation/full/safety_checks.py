@@ -429,10 +429,10 @@ class SafetyAudit:
 
     def witness(self, robot: str) -> Witness:
         """Return the facts about a robot."""
-        known = self._witnesses.get(robot)
-        if known is None:
-            known = self._witnesses[robot] = Witness(self._obeys_within)
-        return known
+        witness = self._witnesses.get(robot)
+        if witness is None:
+            witness = self._witnesses[robot] = Witness(self._obeys_within)
+        return witness
 
     # --- what is seen on the network -------------------------------------------------------
 
@@ -478,8 +478,8 @@ class SafetyAudit:
             if source in self._dvas:
                 self._report([*self._released(robot, witness, message.body)], now, source)
             if source in self._dvas and message.body.answers == witness.question:
-                found = [*_confirms_as_given(witness, message.body.content)]
-                self._report(found, now, source)
+                breaches = [*_confirms_as_given(witness, message.body.content)]
+                self._report(breaches, now, source)
                 self._confirms(witness, message.body.content, now)
             return
         key = message.source, message.message_id
@@ -527,8 +527,8 @@ class SafetyAudit:
         released = witness.hears_release(answer)
         if released is None:
             return
-        asked = self._asked_release.get((robot, released.device), -math.inf)
-        if self._hears_dva and asked < witness.reported_at:
+        requested_at = self._asked_release.get((robot, released.device), -math.inf)
+        if self._hears_dva and requested_at < witness.reported_at:
             yield "S3", f"releases {robot} for {released.device}, who has not asked for that"
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
@@ -571,12 +571,12 @@ class SafetyAudit:
         reply = decode_if_valid(payload) if b"<reply>" in payload else None
         if reply is None or not isinstance(reply.body, m.Reply):
             return
-        asked = witness.unanswered.pop((reply.destination, reply.body.answers), None)
-        if asked is not None:
+        request = witness.unanswered.pop((reply.destination, reply.body.answers), None)
+        if request is not None:
             motion = self._motion_of(source)
             limits = self._motors[source]
-            found = self._answered(witness, motion, limits, asked, reply.body.code, now)
-            self._report(found, now, source)
+            breaches = self._answered(witness, motion, limits, request, reply.body.code, now)
+            self._report(breaches, now, source)
 
     @staticmethod
     def _confirms(witness: Witness, content: m.Content | None, now: float) -> None:
@@ -602,17 +602,17 @@ class SafetyAudit:
         witness: Witness,
         motion: RobotMotion,
         limits: MotorLimits,
-        asked: Unanswered,
+        request: Unanswered,
         code: int,
         now: float,
     ) -> Iterator[Broken]:
         """Note that a robot has answered a request, and so has obeyed it or not."""
-        message = asked.message
-        body = asked.message.body
+        message = request.message
+        body = request.message.body
         match body:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
                 witness.note_stop(now, self._release)
-            case m.PermissionRevocation() if asked.source in self._dvas:
+            case m.PermissionRevocation() if request.source in self._dvas:
                 if len(self._dvas) == 1 or code != m.NOT_PERMITTED:  # a robot obeys one DVA
                     _end(witness, body.session, now)
         if code != m.OK:
@@ -638,23 +638,23 @@ class SafetyAudit:
             if not mine or now > witness.over.get(message.session or 0, now):
                 yield "S5", f"lets {message.source} read {body.sensor}"
         if isinstance(body, _ORDERS):
-            yield from self._ordered(witness, motion, limits, asked, now)
+            yield from self._ordered(witness, motion, limits, request, now)
 
     def _ordered(
         self,
         witness: Witness,
         motion: RobotMotion,
         limits: MotorLimits,
-        asked: Unanswered,
+        request: Unanswered,
         now: float,
     ) -> Iterator[Broken]:
         """Note that a robot has begun to do what somebody asked for."""
-        message = asked.message
+        message = request.message
         level = "teleoperation" if isinstance(message.body, m.StartTeleOp) else "missions"
         broken = witness.permits(message.source, message.session, level, now)
         if broken is not None:
             yield broken
-        if asked.at < witness.stopped:
+        if request.at < witness.stopped:
             if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
@@ -666,7 +666,7 @@ class SafetyAudit:
         if another and _goes(motion) and not _pushed(motion, limits, now):
             yield "S2", f"changed its driver to {message.source} while moving at {_pace(motion)}"
         witness.owner = message.source
-        witness.ordered = asked.at
+        witness.ordered = request.at
         witness.hears(now)
         witness.stood_before = witness.stood
         does = Doing(message.source, message.session, level)
@@ -679,22 +679,22 @@ class SafetyAudit:
     def accepted(self, command: Accepted) -> None:
         """Note that a robot has accepted a command to drive, from whomever."""
         witness = self.witness(command.robot)
-        found: list[Broken] = []
+        breaches: list[Broken] = []
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
-            found.append(broken)
+            breaches.append(broken)
         source = command.source
         session = command.session
         number = command.message_id
         if witness.stopped > witness.ordered and witness.stopped > -0.5:
-            found.append(("S3", "obeys a command after an emergency, before a new order"))
+            breaches.append(("S3", "obeys a command after an emergency, before a new order"))
         elif witness.in_hand(command.time):
-            found.append(("S2", f"obeys {source} while it is driven by hand"))
+            breaches.append(("S2", f"obeys {source} while it is driven by hand"))
         elif witness.does != (source, session, "teleoperation"):
-            found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
-        speaker, known = witness.newest
-        if speaker == (source, session) and number <= known:
-            found.append(("S1", "obeys a command again, or after a newer one"))
+            breaches.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
+        speaker, newest = witness.newest
+        if speaker == (source, session) and number <= newest:
+            breaches.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest = (source, session), number
         witness.hears(command.time)
         copies = witness.arrivals.pop((source, number, session), (command.arrived,))
@@ -703,27 +703,27 @@ class SafetyAudit:
         arrived = max(known_by, default=copies[0])
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
-            found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
+            breaches.append(("S1", "obeys a command behind a picture that it has sent nobody"))
         elif command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
             oldest = pictured + self._max_age
             witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
-                found.append(("S1", "obeys a command behind a picture that was not taken yet"))
-        if found:
-            self._report(found, command.time, command.robot)
+                breaches.append(("S1", "obeys a command behind a picture that was not taken yet"))
+        if breaches:
+            self._report(breaches, command.time, command.robot)
 
     def by_hand(self, done: ByHand) -> None:
         """Note that somebody drives a robot at the robot itself: no message tells of that."""
         witness = self.witness(done.robot)
         now = done.time
-        found = list[Broken]()
+        breaches = list[Broken]()
         if done.what == "takes":
             motion = self._motion_of(done.robot)
             limits = self._motors[done.robot]
-            found = [*_taken_by_hand(witness, motion, limits, now)]
+            breaches = [*_taken_by_hand(witness, motion, limits, now)]
             if not witness.starts_again():
-                found.append(("S3", "is taken by hand before anybody has released it"))
+                breaches.append(("S3", "is taken by hand before anybody has released it"))
             witness.hand = witness.owner = done.who
             witness.ordered = witness.heard = now
             witness.ends("teleoperation", now)
@@ -740,12 +740,12 @@ class SafetyAudit:
             witness.latched = False
         else:
             if witness.stopped > witness.ordered:
-                found.append(("S3", "obeys a hand after an emergency, before it is taken again"))
+                breaches.append(("S3", "obeys a hand after an emergency, before it is taken again"))
             elif witness.hand != done.who:
-                found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
+                breaches.append(("S1", "obeys a hand that has not taken it, or has let it go"))
             witness.allowed = now + self._watchdog
             witness.heard = now
-        self._report(found, now, done.robot)
+        self._report(breaches, now, done.robot)
 
     # --- twice a second, or more often -----------------------------------------------------
 
@@ -755,10 +755,10 @@ class SafetyAudit:
             witness = self.witness(robot)
             limits = self._motors[robot]
             self._overdue(witness, motion, now)
-            found = [*broken_by_wish(witness, motion, now)]
-            found += broken_by_moving(witness, motion, limits, now)
-            found += self._overstays(witness, motion, now)
-            self._report(found, now, robot)
+            breaches = [*broken_by_wish(witness, motion, now)]
+            breaches += broken_by_moving(witness, motion, limits, now)
+            breaches += self._overstays(witness, motion, now)
+            self._report(breaches, now, robot)
             witness.looked = now
             if motion.asked_until <= now:
                 witness.stood = now
@@ -847,9 +847,9 @@ def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[
     if not isinstance(content, m.Permission):
         return
     held = Held(content.device, content.level, content.sensors)
-    given = witness.sessions.get(content.session, held)
-    if given != held:
-        yield "S5", f"gives {given.level} to {given.holder}, and confirms {held.level}"
+    grant = witness.sessions.get(content.session, held)
+    if grant != held:
+        yield "S5", f"gives {grant.level} to {grant.holder}, and confirms {held.level}"
 
 
 def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Iterator[Broken]:
@@ -897,24 +897,24 @@ def broken_by_moving(
     """Return rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
     speed = motion.speed
     turn_rate = motion.turn_rate
-    found: list[Broken] = []
+    breaches: list[Broken] = []
     if _goes(motion):
         allowed = max(witness.allowed, witness.last_mission)
         stopping = _stopping(motion, limits)
         if now > allowed + stopping:
             late = f"{now - allowed:.1f} s after it had to stop"
-            found.append(("S1", f"moves at {_pace(motion)}, {late}"))
+            breaches.append(("S1", f"moves at {_pace(motion)}, {late}"))
         if witness.stopped > witness.ordered and now > witness.stopped + stopping:
             late = f"{now - witness.stopped:.1f} s after an emergency"
-            found.append(("S3", f"moves at {_pace(motion)}, {late}"))
+            breaches.append(("S3", f"moves at {_pace(motion)}, {late}"))
     if not _is_within(speed, turn_rate, limits):
-        found.append(("S4", f"moves at {_pace(motion)}"))
-    if found and _pushed(motion, limits, now):
-        found.clear()
+        breaches.append(("S4", f"moves at {_pace(motion)}"))
+    if breaches and _pushed(motion, limits, now):
+        breaches.clear()
     if not _is_within(motion.asked_speed, motion.asked_turn_rate, limits):
-        asked = f"{motion.asked_speed:.2f} m/s and {motion.asked_turn_rate:.2f} rad/s"
-        found.append(("S4", f"its motors were commanded to {asked}"))
-    return found
+        command = f"{motion.asked_speed:.2f} m/s and {motion.asked_turn_rate:.2f} rad/s"
+        breaches.append(("S4", f"its motors were commanded to {command}"))
+    return breaches
 
 
 def _goes(motion: RobotMotion) -> bool:

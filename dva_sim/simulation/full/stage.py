@@ -105,11 +105,11 @@ def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
     stated = dict(scenario.dva.control_rooms)
     if scenario.dispatch.person is not None:
         stated.setdefault(label_of("control-room", 1), scenario.dispatch.person.role)
-    known = {}
+    roles = {}
     for name, role in stated.items():
         id_tag = name if ":" in name else id_of("control-room", int(name.rpartition("-")[2]))
-        known[id_tag] = ControlRoomRole(role)
-    return known
+        roles[id_tag] = ControlRoomRole(role)
+    return roles
 
 
 def release_of(scenario: Scenario, attended: bool) -> ReleasedBy | None:

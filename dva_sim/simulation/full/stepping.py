@@ -82,8 +82,8 @@ class SteppedDrive:
             ConfigError: nobody answers, or one of them refuses.
         """
         robots = self.run.dva.core.registry.entries
-        known = lambda: self._is_known and self._robot in robots  # noqa: E731
-        self._pass_until(known, "the DVA does not come to know the robot and its driver")
+        is_ready = lambda: self._is_known and self._robot in robots  # noqa: E731
+        self._pass_until(is_ready, "the DVA does not come to know the robot and its driver")
         self._person.sit_down()
         self._person.take([self._robot], self._on_result)
         self._pass_until(self._holds("held"), "the DVA gives no permission")

@@ -158,11 +158,11 @@ class TeamBuilder:
         # What motors of a user got wrong is counted, and the first time told.
         device = robot.device
         failures = robot.body.motors.failures
-        known = self._failures.get(device.label, 0)
-        if failures > known:
-            device.recorder.counters["failed: an answer of a drive"] += failures - known
+        counted = self._failures.get(device.label, 0)
+        if failures > counted:
+            device.recorder.counters["failed: an answer of a drive"] += failures - counted
             self._failures[device.label] = failures
-            if not known:
+            if not counted:
                 device.tell(
                     f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
@@ -263,8 +263,8 @@ class TeamBuilder:
         try:
             places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
         except ConfigError as error:
-            found = len(self._first_places)
-            raise ConfigError(f"{error}; {found} bystanders found one") from None
+            count = len(self._first_places)
+            raise ConfigError(f"{error}; {count} bystanders found one") from None
         self._first_places.append(places[0])
         return places
 

@@ -119,17 +119,17 @@ def verdicts(
     broken = broken_lines(recorder.broken.values())
     why_not = not_judged or {}
     lost = lost or {}
-    found: list[Verdict] = []
+    entries: list[Verdict] = []
     for rule, says in (RULES | OF_REGIONS if of_regions else RULES).items():
         if rule in broken:
-            found += [Verdict(rule, BROKEN, line) for line in broken[rule]]
+            entries += [Verdict(rule, BROKEN, line) for line in broken[rule]]
         elif rule in lost:
-            found.append(Verdict(rule, NOT_JUDGED, lost[rule], lacks_facts=True))
+            entries.append(Verdict(rule, NOT_JUDGED, lost[rule], lacks_facts=True))
         elif rule in why_not:
-            found.append(Verdict(rule, NOT_JUDGED, why_not[rule]))
+            entries.append(Verdict(rule, NOT_JUDGED, why_not[rule]))
         else:
-            found.append(Verdict(rule, HELD, says + until))
-    return found
+            entries.append(Verdict(rule, HELD, says + until))
+    return entries
 
 
 class RulesBroken(DvaSimError):
@@ -144,28 +144,28 @@ class RulesNotJudged(DvaSimError):
     exit_code = ExitCode.NOT_JUDGED
 
 
-def refuse_unheld(found: Sequence[Verdict]) -> None:
+def refuse_unheld(entries: Sequence[Verdict]) -> None:
     """Raise an error if any rule was broken, or could not be judged for lack of facts.
 
     Raises:
         RulesBroken: one was broken.
         RulesNotJudged: none was broken, but facts are missing.
     """
-    if broken := broken_rules(found):
+    if broken := broken_rules(entries):
         raise RulesBroken(broken)
-    if unjudged := unjudged_rules(found):
+    if unjudged := unjudged_rules(entries):
         raise RulesNotJudged(unjudged)
 
 
-def unjudged_rules(found: Iterable[Verdict]) -> str:
+def unjudged_rules(entries: Iterable[Verdict]) -> str:
     """Return the names of all rules that lack facts in a line; empty: none."""
-    unjudged = [verdict.rule for verdict in found if verdict.lacks_facts]
+    unjudged = [verdict.rule for verdict in entries if verdict.lacks_facts]
     return f"facts are missing to judge {', '.join(unjudged)}" if unjudged else ""
 
 
-def broken_rules(found: Iterable[Verdict]) -> str:
+def broken_rules(entries: Iterable[Verdict]) -> str:
     """Return the names of all broken rules in a line; empty: none."""
-    broken = dict.fromkeys(verdict.rule for verdict in found if verdict.is_broken)
+    broken = dict.fromkeys(verdict.rule for verdict in entries if verdict.is_broken)
     return f"the run has broken {', '.join(broken)}" if broken else ""
 
 
@@ -205,8 +205,8 @@ class Judge:
                 audit.by_hand(fact)
             case o.MotionNews():
                 self._sees_robots = True
-                known = {r: of for r, of in fact.motions.items() if r in self._terms.motors}
-                self._motions |= known
+                motions = {r: of for r, of in fact.motions.items() if r in self._terms.motors}
+                self._motions |= motions
                 audit.moves(now, self._motions)
             case o.BookNews() if fact.dva in self._events:
                 self._sees_dva = True

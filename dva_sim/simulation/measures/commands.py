@@ -90,21 +90,21 @@ def applied(arrived: Floats) -> Bools:
         arrived: Arrival times [s], shape `(n,)`; infinity if never.
     """
     order = np.argsort(arrived, kind="stable")
-    found = np.empty(len(arrived), dtype=bool)
-    found[order] = is_applied(order)
-    return found & np.isfinite(arrived)
+    flags = np.empty(len(arrived), dtype=bool)
+    flags[order] = is_applied(order)
+    return flags & np.isfinite(arrived)
 
 
-def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> Floats:
+def round_trips(made: Floats, arrived: Floats, taken: Floats, shown_at: Floats) -> Floats:
     """Return times from an applied command to the first picture that can show it [s].
 
     Args:
         made: Creation times of the commands [s], shape `(n,)`.
         arrived: At the robot [s], shape `(n,)`.
         taken: Capture times of the pictures [s], shape `(m,)`.
-        shown: At the operator [s], shape `(m,)`.
+        shown_at: At the operator [s], shape `(m,)`.
     """
     used = applied(arrived)
-    soonest = np.append(np.minimum.accumulate(shown[::-1])[::-1], math.inf)
+    soonest = np.append(np.minimum.accumulate(shown_at[::-1])[::-1], math.inf)
     trips = soonest[np.searchsorted(taken, arrived[used])] - made[used]
     return trips[np.isfinite(trips)]

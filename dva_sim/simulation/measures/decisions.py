@@ -103,10 +103,10 @@ def _cost(fact: Fact) -> float | None:
 
 
 def _acknowledged(event: Event) -> float:
-    known = event.handling.acknowledged
-    return NAN if known is None else known.time - event.times["detected"]
+    acknowledgement = event.handling.acknowledged
+    return NAN if acknowledgement is None else acknowledgement.time - event.times["detected"]
 
 
 def _assigned(event: Event, facts: Iterable[Fact]) -> float:
-    given = (f.time for f in facts if f.event == event.number and _is_order(f))
-    return next(given, NAN) - event.times["detected"]
+    times = (f.time for f in facts if f.event == event.number and _is_order(f))
+    return next(times, NAN) - event.times["detected"]

@@ -148,16 +148,16 @@ def _stages(drive: Driven) -> Floats:
     moments = (issued - sample_age)[:, np.newaxis] - log.hand_lag * _REMEMBERED
     # What is wanted at a moment is followed after it.
     number = np.searchsorted([intent.time for intent in log.intents], moments, side="left") - 1
-    taken, shown, wanted = np.moveaxis(np.array(log.intents)[number], -1, 0)
+    taken, shown, intended = np.moveaxis(np.array(log.intents)[number], -1, 0)
     columns = (
-        *(s.mean(axis=1) for s in (moments - wanted, shown - taken, wanted - shown)),
+        *(s.mean(axis=1) for s in (moments - intended, shown - taken, intended - shown)),
         *(np.full(len(hold), log.hand_lag), sample_age, hold / 2),
         *(sent - issued, arrived - sent, time - arrived),
         *(time + hold / 2 - captured, hold),
     )
     table = np.stack(columns, axis=1)
-    known: Floats = table[number[:, -1] >= 0]
-    return known
+    complete: Floats = table[number[:, -1] >= 0]
+    return complete
 
 
 def _mean(values: Floats, weights: Floats) -> float:

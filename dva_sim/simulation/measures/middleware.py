@@ -100,16 +100,16 @@ def command_row(
     }
 
 
-def picture_row(taken: Floats, shown: Floats, window: Window) -> Row:
+def picture_row(taken: Floats, shown_at: Floats, window: Window) -> Row:
     """Return the measures of the pictures that arrived.
 
     Args:
         taken: Capture time of each picture [s], shape `(n,)`.
-        shown: Arrival time of each picture [s], shape `(n,)`.
+        shown_at: Arrival time of each picture [s], shape `(n,)`.
         window: The time looked at.
     """
-    inside = (shown >= window.since) & (shown < window.until)
-    ages = (shown - taken)[inside]
+    inside = (shown_at >= window.since) & (shown_at < window.until)
+    ages = (shown_at - taken)[inside]
     return {
         "picture_rate_hz": float(inside.sum()) / window.length,
         **percentiles("picture_age", ages, (50, 95)),
@@ -124,7 +124,7 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
     refused = {note.number for note in run.near if note.kind is NoteKind.REFUSED}
     heard = [note for note in run.far if note.kind is NoteKind.APPLIED]
     taken = _times(run.far, NoteKind.PICTURE_TAKEN)
-    shown = [note for note in run.near if note.kind is NoteKind.PICTURE_SHOWN]
+    pictures = [note for note in run.near if note.kind is NoteKind.PICTURE_SHOWN]
     ready = [note.time for note in run.near if note.kind is NoteKind.READY]
     link = run.link
     row = {
@@ -140,8 +140,8 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
             watchdog_s=scenario.robot.watchdog_s,
         ),
         **picture_row(
-            _floats(taken[note.number] for note in shown),
-            _floats(note.time for note in shown),
+            _floats(taken[note.number] for note in pictures),
+            _floats(note.time for note in pictures),
             window,
         ),
         "up_bytes": link.up.passed_bytes,
@@ -157,7 +157,7 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
         "commands": _fates(
             sent, compress(heard, is_applied([note.number for note in heard])), window
         ),
-        "pictures": _fates(taken, shown, window),
+        "pictures": _fates(taken, pictures, window),
     }
 
 
@@ -168,12 +168,12 @@ def _times(notes: list[Note], kind: NoteKind) -> dict[int, float]:
 
 def _fates(made: dict[int, float], arrived: Iterable[Note], window: Window) -> list[Row]:
     """Return when each was made and arrived, in the run's time; nan for what never arrived."""
-    found = {note.number: note.time - window.start for note in arrived}
+    arrivals = {note.number: note.time - window.start for note in arrived}
     return [
         {
             "number": number,
             "made_s": time - window.start,
-            "arrived_s": found.get(number, math.nan),
+            "arrived_s": arrivals.get(number, math.nan),
         }
         for number, time in made.items()
     ]

@@ -201,16 +201,16 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
     if not minutes:
         return dict.fromkeys(names_of(STEERING), math.nan)
     entropies = [(len(s), steering_entropy(s[:, 1])) for s in samples]
-    known = [(weight, value) for weight, value in entropies if not math.isnan(value)]
+    finite = [(weight, value) for weight, value in entropies if not math.isnan(value)]
     level = sum(int(_is_level(s).sum()) for s in samples) * STEP / 60.0
     made = sum(changes((speed, turn) for _, speed, turn in log.commands) for log in logs)
     turns = sum(reversals(turn for _, _, turn in log.commands) for log in logs)
-    weights = sum(weight for weight, _ in known)
+    weights = sum(weight for weight, _ in finite)
     shares = [log.workload.get("move_and_wait_share", 0.0) for log in logs]
     return {
         "reversals_per_min": turns / minutes,
         "command_changes_per_min": made / minutes,
-        "steering_entropy": sum(w * v for w, v in known) / weights if known else math.nan,
+        "steering_entropy": sum(w * v for w, v in finite) / weights if finite else math.nan,
         "waiting_share": level / minutes,
         "move_waits": sum(log.workload.get("waits", 0.0) for log in logs),
         "move_and_wait_share": float(np.average(shares, weights=[len(s) for s in samples])),
@@ -267,9 +267,9 @@ def path_error(recording: Recording) -> Row:
 def was_there(recording: Recording, event: int, time: float) -> bool:
     """Return True if the DVA's event of that number was about something real at `time` [s]."""
     for number, incident in enumerate(recording.incidents):
-        known = recording.event_of(number)
+        other = recording.event_of(number)
         over = recording.contained.get(number, math.inf)
-        if known is not None and known.number == event and incident.is_there(time) and time <= over:
+        if other is not None and other.number == event and incident.is_there(time) and time <= over:
             return True
     return False
 

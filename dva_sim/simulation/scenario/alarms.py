@@ -31,9 +31,9 @@ def with_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> Sce
     Raises:
         ConfigError: see `read_events`.
     """
-    found = table_events(scenario, table, error)
-    scenario = scenario.model_copy(update={"events": tuple(map(_event, found.alarms))})
-    scenario.tell(found)
+    table_rows = table_events(scenario, table, error)
+    scenario = scenario.model_copy(update={"events": tuple(map(_event, table_rows.alarms))})
+    scenario.tell(table_rows)
     return scenario
 
 

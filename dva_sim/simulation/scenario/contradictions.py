@@ -129,12 +129,12 @@ def _of_computer(scenario: Scenario) -> Iterator[str]:
 def _of_pictures(scenario: Scenario) -> Iterator[str]:
     camera = scenario.camera
     down = scenario.link.toward("down")
-    wanted = camera.rate_hz * camera.frame_bytes * _BITS
-    if scenario.link.trace_down is None and wanted > down.rate_bps:
+    bit_rate = camera.rate_hz * camera.frame_bytes * _BITS
+    if scenario.link.trace_down is None and bit_rate > down.rate_bps:
         yield (
-            f"the camera sends {wanted / 1e3:g} kbit/s (camera.rate_hz x frame_bytes) over a link "
-            f"of {down.rate_bps / 1e3:g} kbit/s (link.rate_bps): pictures will come late or not "
-            "at all"
+            f"the camera sends {bit_rate / 1e3:g} kbit/s (camera.rate_hz x frame_bytes) over a "
+            f"link of {down.rate_bps / 1e3:g} kbit/s (link.rate_bps): pictures will come late or "
+            "not at all"
         )
     if camera.encode_s * camera.rate_hz > 1:
         yield (

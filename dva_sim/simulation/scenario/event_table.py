@@ -100,9 +100,9 @@ class WithTable(Config):
         """Rows of a table that are not in the run, or repeat others; each without full stop."""
         return self._told[1]
 
-    def tell(self, found: TableEvents) -> None:
+    def tell(self, events: TableEvents) -> None:
         """Keep what is said of the table that the events have come from."""
-        self._told = found.summary, found.doubts
+        self._told = events.summary, events.doubts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +197,7 @@ class _Reader:
         self._rooms = {room.casefold(): room for room in ground.rooms}
 
     def events(self, horizon_s: float, error: Fail) -> TableEvents:
-        found = list[tuple[float, TableAlarm]]()
+        alarms = list[tuple[float, TableAlarm]]()
         skipped = 0
         order = 0
         seen = set[tuple[float, TableAlarm]]()
@@ -212,22 +212,22 @@ class _Reader:
             if not kind:
                 skipped += 1
                 continue
-            found.append((time, self._alarm(cells, kind)))
-            if found[-1] in seen:
+            alarms.append((time, self._alarm(cells, kind)))
+            if alarms[-1] in seen:
                 repeats.append(cells.line)
-            seen.add(found[-1])
-        if not found:
+            seen.add(alarms[-1])
+        if not alarms:
             raise ConfigError("has no alarms: write a row for each below the header",
                               self._rows.file)  # fmt: skip
-        found.sort(key=lambda each: each[0])
-        zero = self._zero(found[0][0], error)
-        within = [replace(a, at_s=t - zero) for t, a in found if 0 <= t - zero < horizon_s]
-        early = sum(time < zero for time, _ in found)
-        late = len(found) - early - len(within)
+        alarms.sort(key=lambda each: each[0])
+        zero = self._zero(alarms[0][0], error)
+        within = [replace(a, at_s=t - zero) for t, a in alarms if 0 <= t - zero < horizon_s]
+        early = sum(time < zero for time, _ in alarms)
+        late = len(alarms) - early - len(within)
         left_out = self._left_out(skipped, early, late, horizon_s)
         if not within:
             text = f"{left_out}: none is left; set events.start to a moment of the table"
-            raise error(f"{text}, whose first row is at {self._moments.text(found[0][0])}", ())
+            raise error(f"{text}, whose first row is at {self._moments.text(alarms[0][0])}", ())
         doubts = tuple(filter(None, (left_out, self._repeated(repeats))))
         return TableEvents(within, self._summary(within, zero, order), doubts)
 
@@ -314,8 +314,8 @@ class _Reader:
             return None
         room = self._rooms.get(cell.text.casefold())
         if room is None:
-            known = hint(cell.text, list(self._ground.rooms), "rooms")
-            raise cell.error(f"there is no room {cell.text!r}; {known}")
+            suggestion = hint(cell.text, list(self._ground.rooms), "rooms")
+            raise cell.error(f"there is no room {cell.text!r}; {suggestion}")
         return room
 
     def _position(self, cells: Cell) -> Point | None:

@@ -43,15 +43,15 @@ def read_instructions(path: Path) -> tuple[Instruction, ...]:
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(f"instructions {str(path)!r} cannot be read: {reason}") from None
     lines = [" ".join(line.split()) for line in text.splitlines()]
-    found = tuple(_instruction(line) for line in lines if line)
-    if not found or len(found) > MOST_LINES:
-        has = f"{len(found)} lines" if found else "no text"
+    instructions = tuple(_instruction(line) for line in lines if line)
+    if not instructions or len(instructions) > MOST_LINES:
+        has = f"{len(instructions)} lines" if instructions else "no text"
         raise ConfigError(f"instructions {str(path)!r} have {has}; 1 to {MOST_LINES} lines fit")
-    if any(len(line.text) > LONGEST_LINE for line in found):
+    if any(len(line.text) > LONGEST_LINE for line in instructions):
         raise ConfigError(
             f"instructions {str(path)!r} have a line of more than {LONGEST_LINE} characters"
         )
-    return found
+    return instructions
 
 
 def _instruction(line: str) -> Instruction:

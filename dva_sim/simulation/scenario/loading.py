@@ -58,10 +58,10 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
     holders += [(event, "kind") for event in events] if isinstance(events, list | tuple) else []
     for holder, key in holders:
         named = holder.get(key) if isinstance(holder, dict) else None
-        file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
+        file, colon, class_name = named.rpartition(":") if isinstance(named, str) else ("", "", "")
         beside = [folder / file for folder in folders if colon and resources.is_file(folder / file)]
         if beside and isinstance(holder, dict):
-            holder[key] = f"{beside[0]}:{wanted}"
+            holder[key] = f"{beside[0]}:{class_name}"
 
 
 def _locate_table(events: dict[str, Any], folders: Sequence[Path]) -> None:
@@ -91,12 +91,12 @@ def check_names(scenario: Scenario, error: Fail) -> None:
         ("bystander", "profile"): (scenario.bystander.profile, "agents/people"),
         ("operator", "population"): (scenario.operator.population, "agents/people"),
     }
-    for path, (given, folder) in choices.items():
-        for name in (given,) if isinstance(given, str) else given:
+    for path, (chosen, folder) in choices.items():
+        for name in (chosen,) if isinstance(chosen, str) else chosen:
             if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
                 key = ".".join(str(p) for p in path)
-                known = resources.available(folder)
-                raise error(unknown(key, name, sorted(known)), path)
+                available = resources.available(folder)
+                raise error(unknown(key, name, sorted(available)), path)
     if scenario.operator.traits:
         with _located(error, lambda _: ("operator", "traits")):
             population(scenario.operator)
@@ -185,14 +185,14 @@ def _located(error: Fail, place: Callable[[ConfigError], KeyPath]) -> Iterator[N
 
 
 def _pattern_key(problem: ConfigError) -> KeyPath:
-    found = _OPTION.search(problem.problem)
-    return ("pattern_options", found[1]) if found else ("pattern",)
+    match = _OPTION.search(problem.problem)
+    return ("pattern_options", match[1]) if match else ("pattern",)
 
 
 def _place(problem: ConfigError, part: str, key: str, options: str) -> KeyPath:
     """Return the key for reporting a problem: the option that it mentions, or the name."""
-    found = _OPTION.search(problem.problem)
-    return (part, options, found[1]) if found else (part, key)
+    match = _OPTION.search(problem.problem)
+    return (part, options, match[1]) if match else (part, key)
 
 
 FOLDER = "experiments/scenarios"

@@ -11,11 +11,11 @@ from dva_sim.simulation.scenario.loading import build
 from dva_sim.simulation.scenario.scenario import Scenario
 
 
-def lone_robot(given: Mapping[str, Any], changes: Sequence[str]) -> Scenario:
+def lone_robot(keys: Mapping[str, Any], changes: Sequence[str]) -> Scenario:
     """Build the scenario.
 
     Args:
-        given: Keys of the robot and its site, as a file would hold them.
+        keys: Keys of the robot and its site, as a file would hold them.
         changes: Changes, `KEY=VALUE`.
 
     Raises:
@@ -23,7 +23,7 @@ def lone_robot(given: Mapping[str, Any], changes: Sequence[str]) -> Scenario:
     """
     source: dict[str, Any] = {
         "description": "One robot, driven by permission of a DVA elsewhere.",
-        **given,
+        **keys,
         "guard": {"count": 0},
         "operator": {"count": 1},  # elsewhere
         "bystander": {"count": 0},

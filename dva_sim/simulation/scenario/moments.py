@@ -26,10 +26,10 @@ def zone_named(name: str) -> ZoneInfo:
     try:
         return ZoneInfo(name)
     except (OSError, ValueError, KeyError):
-        if not (known := available_timezones()):
+        if not (zones := available_timezones()):
             problem = "this computer knows no time zones: pip install tzdata"
             raise ConfigError(f"time_zone {name!r}: {problem}") from None
-        near = guess(name, known)
+        near = guess(name, zones)
         more = f"did you mean {near!r}?" if near else "write one such as Europe/Lisbon, or UTC"
         raise ConfigError(f"time_zone {name!r} is not known; {more}") from None
 
@@ -60,13 +60,13 @@ class MomentReader:
                 raise
             raise cell.error(f"time {problem.problem}") from None
 
-    def parse(self, given: str | float) -> float:
+    def parse(self, moment: str | float) -> float:
         """Return the time of a text or number whose place is not known [s].
 
         Raises:
             ConfigError: as `read`.
         """
-        text = str(given)
+        text = str(moment)
         seconds = _seconds(text)
         is_seconds = seconds is not None
         if self._is_seconds is None:

@@ -90,8 +90,8 @@ def _area_of(name: str, region: RegionConfig, site: Site, error: Fail) -> Any:
     parts: list[Any] = []
     for room in region.rooms:
         if room not in {each.name for each in site.rooms}:
-            known = [each.name for each in site.rooms]
-            problem = unknown("room", room, known) if known else "a bare map names no rooms"
+            rooms = [each.name for each in site.rooms]
+            problem = unknown("room", room, rooms) if rooms else "a bare map names no rooms"
             raise _wrong(problem, error, name, "rooms")
         parts.append(site.ground_of(site.room(room)))
     if region.polygon:

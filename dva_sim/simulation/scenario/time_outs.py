@@ -26,18 +26,18 @@ def time_out_s(needed_s: float) -> float:
 
 def request_timeout_s(scenario: Scenario) -> float:
     """Return the time-out of a request: as given, else as the link and the backbone need it [s]."""
-    given = scenario.request.timeout_s
+    timeout_s = scenario.request.timeout_s
     backbone = scenario.dva.backbone
     needed_s = start_needs_s(scenario)
     if backbone is not None:
         needed_s = max(needed_s, TRIPS_OF_A_START * round_trip_s(backbone))
-    return time_out_s(needed_s) if given is None else given
+    return time_out_s(needed_s) if timeout_s is None else timeout_s
 
 
 def command_timeout_s(scenario: Scenario) -> float:
     """Return the time-out of a command that is to be answered, likewise [s]."""
-    given = scenario.command.timeout_s
-    return time_out_s(start_needs_s(scenario)) if given is None else given
+    timeout_s = scenario.command.timeout_s
+    return time_out_s(start_needs_s(scenario)) if timeout_s is None else timeout_s
 
 
 def start_needs_s(scenario: Scenario) -> float:

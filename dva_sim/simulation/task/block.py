@@ -82,11 +82,11 @@ class TunnelGoal(Goal):
         inside = self._kept.note(offset, (x, y), dt)
         return self._along >= self.length or (self._task.on_error == "over" and not inside)
 
-    def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
+    def corrected(self, share: float, now: float, at: Cursor, command: Velocity) -> Velocity:
         """Return the machine's help sideways; the way along the tunnel stays the person's."""
         _, offset, (tx, ty) = self.place(at.x, at.y)
-        forward = wanted[0] * tx + wanted[1] * ty
-        aside = wanted[1] * tx - wanted[0] * ty
+        forward = command[0] * tx + command[1] * ty
+        aside = command[1] * tx - command[0] * ty
         aside = (1.0 - share) * aside - share * MACHINE_GAIN * offset
         return forward * tx - aside * ty, forward * ty + aside * tx
 
@@ -214,7 +214,7 @@ def _play(
     plan = [(conditions[0], -1)] * scenario.practice
     plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
     for number, (condition, cell) in enumerate(plan):
-        kept = number - scenario.practice
+        counted = number - scenario.practice
         streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
         alertness = float(streams.fresh("reaction").normal())
         seat.person = in_a_moment(practised(who, number), alertness, scenario.task)
@@ -222,14 +222,14 @@ def _play(
         trial = _trial(scenario, seat, condition, number, streams)
         if recording is not None and isinstance(trial, DriveTrial):
             trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))
-        trial.run(keep=kept == drawn)
+        trial.run(keep=counted == drawn)
         seat.delay.intend(seat.begun + trial.now, 0.0, 0.0)
         seat.delay.rest()
         seat.begun += trial.now + PAUSE
-        if kept >= 0:
+        if counted >= 0:
             trial.draw_goal()
-            yield _row(trial, condition, cell, kept), trial.trace
-        if drawn is not None and kept == drawn:
+            yield _row(trial, condition, cell, counted), trial.trace
+        if drawn is not None and counted == drawn:
             return
 
 
@@ -274,16 +274,16 @@ def _goal(
 
 
 def _row(
-    trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, kept: int
+    trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, number: int
 ) -> Row:
     """Return the measures of a trial, with what tells it from the others."""
     goal = trial.row() if isinstance(trial, DriveTrial) else trial.goal.row(trial)
     names = NAMES[trial.scenario.task.kind]
     return {
-        "number": kept,
+        "number": number,
         "condition": cell,
         **dict(zip(names, condition, strict=True)),
-        "since_start": kept + 1 + trial.scenario.practice,
+        "since_start": number + 1 + trial.scenario.practice,
         **goal,
         "trial_time_s": trial.now,
         "path_m": trial.path,

@@ -162,21 +162,21 @@ class DriveTrial(Trial[Observation]):
     def advance(self, dt: float) -> None:
         plant = self.plant
         speed, turn = self.commanded(dt)
-        wanted = Intent(speed * self._top[0], turn * self._top[1])
+        intent = Intent(speed * self._top[0], turn * self._top[1])
         if self.scenario.automation:
-            wanted = self._corrected(self.scenario.automation, wanted)
-        plant.step(wanted.speed, wanted.turn_rate, dt)
+            intent = self._corrected(self.scenario.automation, intent)
+        plant.step(intent.speed, intent.turn_rate, dt)
         self.path += plant.speed * dt
         ahead = self._way.ahead(plant.x, plant.y, 0.0, 0.0)
         self._kept.note(ahead.offset, (plant.x, plant.y), dt)
         self.over = ahead.remaining <= RUN_OUT
 
-    def _corrected(self, share: float, wanted: Intent) -> Intent:
+    def _corrected(self, share: float, intent: Intent) -> Intent:
         """Return the machine helps to steer (pure pursuit); the speed stays the person's."""
         at = self.plant
         ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
         own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
-        return Intent(wanted.speed, (1.0 - share) * wanted.turn_rate + share * own)
+        return Intent(intent.speed, (1.0 - share) * intent.turn_rate + share * own)
 
     def row(self) -> dict[str, Any]:
         """Return what is measured."""

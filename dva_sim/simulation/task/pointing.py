@@ -141,9 +141,9 @@ class Goal(ABC):
         """True if pressing the button has an effect now."""
         return False
 
-    def pushed(self, now: float, wanted: Velocity) -> Velocity:
+    def pushed(self, now: float, command: Velocity) -> Velocity:
         """Return the command with what disturbs the cursor [m/s]."""
-        return wanted
+        return command
 
     def holds(self, now: float) -> bool:
         """Return True while something else is done, during which the cursor stays."""
@@ -251,13 +251,13 @@ class CursorTrial(Trial[Sighting]):
         now = self.now
         plant = self.plant
         goal = self.goal
-        wanted = self.commanded(dt)
+        command = self.commanded(dt)
         if self.scenario.automation:
-            wanted = goal.corrected(self.scenario.automation, now, plant, wanted)
-        wanted = goal.pushed(now, wanted)
+            command = goal.corrected(self.scenario.automation, now, plant, command)
+        command = goal.pushed(now, command)
         if goal.holds(now):
-            wanted = 0.0, 0.0
-        plant.step(wanted[0], 0.0 if goal.flat else wanted[1], dt)
+            command = 0.0, 0.0
+        plant.step(command[0], 0.0 if goal.flat else command[1], dt)
         self.path += math.hypot(plant.vx, plant.vy) * dt
         if self.moved_at is None and self.path > MOVED:
             self.moved_at = now + dt

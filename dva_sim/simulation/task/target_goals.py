@@ -21,13 +21,13 @@ SAMPLE_STEPS = 5  # a tracking record keeps every fifth step
 class ToTarget(Goal):
     """Base class of goals with a target."""
 
-    def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
+    def corrected(self, share: float, now: float, at: Cursor, command: Velocity) -> Velocity:
         """Return the whole of what is wanted: all of it is correction."""
         tx, ty = self.target(now)
         own = 1.0 - share
         return (
-            own * wanted[0] + share * MACHINE_GAIN * (tx - at.x),
-            own * wanted[1] + share * MACHINE_GAIN * (ty - at.y),
+            own * command[0] + share * MACHINE_GAIN * (tx - at.x),
+            own * command[1] + share * MACHINE_GAIN * (ty - at.y),
         )
 
 
@@ -214,10 +214,10 @@ class TrackGoal(ToTarget):
         return (0.0 if self.is_stationary else self._sum(now)), 0.0
 
     @override
-    def pushed(self, now: float, wanted: Velocity) -> Velocity:
+    def pushed(self, now: float, command: Velocity) -> Velocity:
         # The command is kept, as the answer to the push.
-        self._last_command = wanted[0]
-        return (wanted[0] + self._sum(now), wanted[1]) if self.is_stationary else wanted
+        self._last_command = command[0]
+        return (command[0] + self._sum(now), command[1]) if self.is_stationary else command
 
     def _sum(self, now: float) -> float:
         return sum(a * math.sin(w * now + p) for a, w, p in self._waves)
@@ -239,18 +239,18 @@ class TrackGoal(ToTarget):
         # Without a whole record the crossover is nan.
         targets = np.array(self._targets)
         cursors = np.array(self._cursors)
-        found = movement_laws.Crossover(math.nan, math.nan)
+        crossover = movement_laws.Crossover(math.nan, math.nan)
         if trial.over:
             frequencies = self._task.frequencies
             loop = movement_laws.open_loop(targets, cursors, self._dt, frequencies)
-            found = movement_laws.crossover(frequencies, loop)
+            crossover = movement_laws.crossover(frequencies, loop)
         return {
             "movement_time_s": trial.now,
             "completed": float(trial.over),
             "tracking_error_rms_m": float(np.sqrt(np.mean((targets - cursors) ** 2))),
             "target_rms_m": float(np.sqrt(np.mean(targets**2))),
-            "crossover_rad_s": found.frequency,
-            "phase_margin_deg": math.degrees(found.phase_margin),
+            "crossover_rad_s": crossover.frequency,
+            "phase_margin_deg": math.degrees(crossover.phase_margin),
         }
 
     def draw(self, trace: Trace) -> None:

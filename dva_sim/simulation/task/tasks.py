@@ -22,9 +22,9 @@ Several = Annotated[tuple[Length, ...], Field(min_length=1, max_length=50)]
 Values = Length | Several
 
 
-def values_of(given: float | tuple[float, ...]) -> tuple[float, ...]:
+def values_of(value: float | tuple[float, ...]) -> tuple[float, ...]:
     """Return one value or several, as several."""
-    return given if isinstance(given, tuple) else (given,)
+    return value if isinstance(value, tuple) else (value,)
 
 
 class Pointing(Config):

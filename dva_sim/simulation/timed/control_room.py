@@ -124,9 +124,9 @@ def _preference(shift: Team) -> Callable[[m.Position, Sequence[str]], Sequence[f
         for zone, names in shift.scenario.dispatch.preferences.items()
     }
 
-    def rank(position: m.Position, asked: Sequence[str]) -> list[float]:
+    def rank(position: m.Position, devices: Sequence[str]) -> list[float]:
         ranks = lists.get(shift.terrain.known_at(position).zone, everybody)
-        return [ranks.get(device, float("inf")) for device in asked]
+        return [ranks.get(device, float("inf")) for device in devices]
 
     return rank
 

@@ -231,12 +231,12 @@ def _sum_up(cell: list[float], since: float, event: Event) -> None:
 def _row(
     incident: Incident, event: Event | None, outcome: int, units: dict[str, int]
 ) -> tuple[float, ...]:
-    known = _known_of(incident)
+    columns = _known_of(incident)
     if event is None:
-        return (*known, *(_NAN,) * len(TIMES), outcome, -1, -1, 0, 0, 0, -1, incident.shared)
+        return (*columns, *(_NAN,) * len(TIMES), outcome, -1, -1, 0, 0, 0, -1, incident.shared)
     get = event.times.get
     return (
-        *known,
+        *columns,
         *(get(name, _NAN) for name in TIMES),
         outcome,
         units.get(event.responder or "", -1),

@@ -66,7 +66,7 @@ def _foresee(scenario: TimedScenario, seed: int) -> tuple[Shift, list[Incident]]
     watched = scenario.model_copy(update={"dispatch": patient, "drain": False})
     shift = Shift(watched, seed, _Nobody())
     shift.run()
-    incidents = [each for known in shift.events.values() for each in known]
+    incidents = [each for events in shift.events.values() for each in events]
     if not 0 < len(incidents) <= MOST_EVENTS:
         raise ConfigError(
             f"the oracle plans for 1 to {MOST_EVENTS} events; this run has {len(incidents)}: "

@@ -75,10 +75,10 @@ def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
         raise error(problem.problem, ("site", "name")) from None
 
 
-def _known(names: Any, known: list[str], what: str, path: KeyPath, error: Fail) -> None:
+def _known(names: Any, valid: list[str], what: str, path: KeyPath, error: Fail) -> None:
     for name in names:
-        if name not in known:
-            raise error(unknown(what, name, known), (*path, name))
+        if name not in valid:
+            raise error(unknown(what, name, valid), (*path, name))
 
 
 def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> None:
@@ -93,8 +93,8 @@ def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> Non
     ]
     for place, path, names in places:
         if isinstance(place, str) and not _names_place(place, scenario, [*zones, *names]):
-            known = ["random", *(["post", "robot_base"] if scenario.site else []), *names, *zones]
-            raise error(unknown("place", place, known), path)
+            valid = ["random", *(["post", "robot_base"] if scenario.site else []), *names, *zones]
+            raise error(unknown("place", place, valid), path)
 
 
 def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
@@ -112,9 +112,9 @@ def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
     Raises:
         ConfigError: see `read_events`.
     """
-    found = table_events(scenario, error)
+    table_rows = table_events(scenario, error)
     by_kind: dict[str, list[ListedEvent]] = {}
-    for alarm in found.alarms:
+    for alarm in table_rows.alarms:
         by_kind.setdefault(alarm.kind, []).append(
             ListedEvent(
                 at_s=alarm.at_s,
@@ -132,7 +132,7 @@ def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
         data = {"kind": kind, "name": name or kind, "listed": events}
         streams.append(validate(EventStream, data, lambda p, _: error(p, ("events", "kinds"))))
     scenario = scenario.model_copy(update={"demand": (*scenario.demand, *streams), "events": None})
-    scenario.tell(found)
+    scenario.tell(table_rows)
     return scenario
 
 
@@ -343,8 +343,8 @@ class EventStream(Config):
 
     @model_validator(mode="after")
     def _one_origin(self) -> EventStream:
-        given = [self.between, self.sources, self.batch, self.listed or None]
-        if sum(g is not None for g in given) != 1:
+        origins = [self.between, self.sources, self.batch, self.listed or None]
+        if sum(g is not None for g in origins) != 1:
             raise ValueError("a stream needs one of between, sources, batch and listed")
         if isinstance(self.between, Constant) and self.between.mean_s <= 0:
             raise ValueError("between should be longer than 0 s")

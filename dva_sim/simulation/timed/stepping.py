@@ -97,12 +97,12 @@ class SteppedShift:
         self.situation = None
 
     def _wait(self) -> Situation | None:
-        asked = self._questions.get()
-        if isinstance(asked, BaseException):
+        question = self._questions.get()
+        if isinstance(question, BaseException):
             self.situation = None
-            raise asked
-        self.situation = asked
-        return asked
+            raise question
+        self.situation = question
+        return question
 
     # --- in the thread of the shift ------------------------------------------------------
 

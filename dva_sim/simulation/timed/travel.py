@@ -110,11 +110,11 @@ class Terrain:
 
     def known_at(self, position: m.Position) -> Place:
         """Return the place that a message speaks of."""
-        known = self._known.get(position)
-        if known is None:
+        place = self._known.get(position)
+        if place is None:
             x, y = self.frame.to_xy(position.latitude, position.longitude)
-            known = Place(x, y, position)
-        return known
+            place = Place(x, y, position)
+        return place
 
     def event_place(self, zone: int, u: float, v: float) -> Place:
         """Return the place of an event by two uniform random numbers, at a position of its own."""
@@ -402,14 +402,14 @@ class Rooms(Terrain):
 
     @override
     def named(self, name: str, number: int) -> Place:
-        what, _, given = name.partition("-")
+        what, _, count = name.partition("-")
         if name in self.zones or what not in ("post", "robot_base"):
             return super().named(name, number)
         poses = self.site.guard_posts if what == "post" else self.site.robot_bases
-        if not poses or int(given or 1) > len(poses):
-            wanted = f"no {name!r}: there are {len(poses)}"
-            raise ConfigError(f"site {self.site.name!r} has {wanted}")
-        return self._base(poses[((int(given) if given else number) - 1) % len(poses)])
+        if not poses or int(count or 1) > len(poses):
+            problem = f"no {name!r}: there are {len(poses)}"
+            raise ConfigError(f"site {self.site.name!r} has {problem}")
+        return self._base(poses[((int(count) if count else number) - 1) % len(poses)])
 
     def _base(self, pose: Pose) -> Place:
         room = self.site.room_at(pose.x, pose.y)

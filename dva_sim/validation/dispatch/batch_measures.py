@@ -318,9 +318,9 @@ def _check_detail(word: str, detail: str, scenario: TimedScenario) -> None:
             _known(stream, scenario.stream_names, "stream")
 
 
-def _known(word: str, known: list[str], what: str) -> None:
-    if word not in known:
-        raise ConfigError(unknown(what, word, known))
+def _known(word: str, valid: list[str], what: str) -> None:
+    if word not in valid:
+        raise ConfigError(unknown(what, word, valid))
 
 
 # --- of each event ---------------------------------------------------------------------

@@ -54,19 +54,19 @@ def exact_values(
         raise ConfigError(unknown("formula", name, FORMULAS))
     formula = FORMULAS[name]
     hints = get_type_hints(formula, include_extras=True)
-    given = {}
+    arguments = {}
     for key, value in parameters.items():
         if key not in hints or key == "return":
-            known = ", ".join(inspect.signature(formula).parameters)
-            raise ConfigError(f"formula {name!r} has no parameter {key!r}; it has {known}")
+            names = ", ".join(inspect.signature(formula).parameters)
+            raise ConfigError(f"formula {name!r} has no parameter {key!r}; it has {names}")
         suited = _suited(key, hints[key], _resolved(value, scenario), scenario)
-        given[key] = _checked(key, hints[key], suited, value)
+        arguments[key] = _checked(key, hints[key], suited, value)
     for key, parameter in inspect.signature(formula).parameters.items():
-        if parameter.default is parameter.empty and key not in given:
+        if parameter.default is parameter.empty and key not in arguments:
             raise ConfigError(f"formula {name!r} needs the parameter {key!r}")
     try:
         _, _, text = (inspect.getdoc(formula) or "").partition("References:")
-        return formula(**given), " ".join(text.split())
+        return formula(**arguments), " ".join(text.split())
     except (ArithmeticError, LookupError, TypeError) as error:
         problem = f"formula {name!r} does not hold for these parameters: {error}"
         raise ConfigError(problem) from error
@@ -89,10 +89,10 @@ def _walk(node: Any, path: list[str], whole: str) -> Any:
     rest = path[1:]
     if step == "*" and isinstance(node, tuple):
         return [_walk(item, rest, whole) for item in node]
-    found = _item(node, step) if isinstance(node, tuple) else _inside(node, step)
-    if found is None:
+    value = _item(node, step) if isinstance(node, tuple) else _inside(node, step)
+    if value is None:
         raise ConfigError(f"{whole!r}: there is no {step!r} in the scenario")
-    return _walk(found, rest, whole)
+    return _walk(value, rest, whole)
 
 
 def _inside(node: Any, step: str) -> Any:
@@ -122,8 +122,8 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
     is_rate = key.startswith("arrival_rate")
     memoryless = _mentions(hint, lambda h: "exponential" in getattr(h, "__metadata__", ()))
     if (is_rate or memoryless) and not isinstance(value, distributions.Exponential):
-        given = getattr(value, "law", value)
-        raise ConfigError(f"{key} needs an exponential law, not {given}")
+        law = getattr(value, "law", value)
+        raise ConfigError(f"{key} needs an exponential law, not {law}")
     return 1 / value.mean if is_rate else value.mean
 
 
@@ -279,13 +279,13 @@ def _case(name: str, config: CaseConfig, document: Document) -> Case:
 
 def _exact(config: CaseConfig, scenario: TimedScenario) -> tuple[dict[str, float], str]:
     """Return the exact value of each measure, and the formula's sources."""
-    known, source = exact_values(config.formula, config.parameters, scenario)
+    values, source = exact_values(config.formula, config.parameters, scenario)
     exact = {}
     for measure, answer in (config.measures | config.loosely).items():
         if isinstance(answer, str):
-            if answer not in known:
-                raise ConfigError(unknown("answer", answer, known))
-            exact[measure] = known[answer]
+            if answer not in values:
+                raise ConfigError(unknown("answer", answer, values))
+            exact[measure] = values[answer]
         elif not config.source:
             raise ConfigError(f"measure {measure!r} is compared with a number: say its source")
         else:

@@ -74,24 +74,24 @@ def check_cases(
     checks = []
     for case in cases:
         runs = _runs(case, quick)
-        found = _compare(case, _columns(_jobs(case, seed, runs), rows))
-        off = [e for e in found if e.verdict == "misses" and e.predicted_low is not None]
+        lines = _compare(case, _columns(_jobs(case, seed, runs), rows))
+        off = [e for e in lines if e.verdict == "misses" and e.predicted_low is not None]
         if off:
             again = _jobs(case, seed, LOOK_AGAIN * runs)
             rows |= play_jobs(again[runs:], play, workers, FAILED)
             why = f"{LOOK_AGAIN} times as long, for {', '.join(f'{e.claim} {e.note}' for e in off)}"
             longer = _compare(case, _columns(again, rows))
-            found = [replace(e, note="; ".join(filter(None, (e.note, why)))) for e in longer]
-        checks += found
+            lines = [replace(e, note="; ".join(filter(None, (e.note, why)))) for e in longer]
+        checks += lines
     return checks
 
 
 def play(job: StudyJob) -> Tables:
     """Return one run: tops and bottoms of each measure, and the controls, one row per batch."""
     scenario = cast(TimedScenario, job.scenario)
-    asked = job.levels
+    levels = job.levels
     sample = sample_of(simulate_timed(scenario, job.seed))
-    batches = Batches(sample, int(str(asked["batches"])))
+    batches = Batches(sample, int(str(levels["batches"])))
     columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}
     columns["broken"] = np.full(len(batches.lengths), float(sample.broken))
     columns["open"] = batches.count(sample.outcome == "open")
@@ -101,7 +101,7 @@ def play(job: StudyJob) -> Tables:
     for name, (area, by_event) in _little(sample, batches).items():
         columns[f"area {name}"] = area
         columns[f"times {name}"] = by_event
-    for number, name in enumerate(json.loads(str(asked["measures"]))):
+    for number, name in enumerate(json.loads(str(levels["measures"]))):
         columns[f"top {number}"], columns[f"bottom {number}"] = sums(name, batches)
     for name, (top, bottom) in inputs(batches, scenario).items():
         columns[f"in {name}"] = top
@@ -169,8 +169,8 @@ def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]
 
 def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns:
     """Return the batches of all runs of a case, run after run."""
-    found = [row for job in jobs for row in rows[job.key]]
-    return {name: np.array([row[name] for row in found], dtype=float) for name in found[0]}
+    batches = [row for job in jobs for row in rows[job.key]]
+    return {name: np.array([row[name] for row in batches], dtype=float) for name in batches[0]}
 
 
 def _compare(case: Case, columns: Columns) -> list[Evidence]:
@@ -178,28 +178,28 @@ def _compare(case: Case, columns: Columns) -> list[Evidence]:
 
     Results, what was put in, and what must hold in any case.
     """
-    known = [values for name, values in columns.items() if name.startswith("control ")]
-    controls = np.column_stack(known) if known else None
-    found = [
+    variates = [values for name, values in columns.items() if name.startswith("control ")]
+    controls = np.column_stack(variates) if variates else None
+    comparisons = [
         ("result", measure, exact, estimate(columns[f"top {n}"], columns[f"bottom {n}"], controls))
         for n, (measure, exact) in enumerate(case.exact.items())
     ]
     for name in (name.removeprefix("in ") for name in columns if name.startswith("in ")):
         share = estimate(columns[f"in {name}"], columns[f"expected {name}"])
-        found.append(("input", f"{name}, share of the expected", 1.0, share))
+        comparisons.append(("input", f"{name}, share of the expected", 1.0, share))
     for name in ("waiting", "served"):
         area = columns[f"area {name}"].sum()
         times = columns[f"times {name}"].sum()
         law = "identity", f"Little's law, {name}", 1.0, certain(area / times if times else 1.0)
-        found.append(law)
+        comparisons.append(law)
     worked = columns["worked"].sum()
     had = columns["had work"].sum()
     same = certain(worked / had if had else 1.0)
-    found.append(("identity", "work by the units over work by the events", 1.0, same))
+    comparisons.append(("identity", "work by the units over work by the events", 1.0, same))
     lost = columns["open"].sum() + columns["broken"].max()
-    found.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
+    comparisons.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
     lines = []
-    for kind, measure, exact, value in found:
+    for kind, measure, exact, value in comparisons:
         is_strict = kind == "result" and measure not in case.loosely
         precision = PRECISION if is_strict else None
         line = _line(case.name, GROUPS.get(kind, case.title), measure, exact, value, precision)
@@ -212,29 +212,29 @@ def _line(
     group: str,
     claim: str,
     exact: float,
-    found: Estimate,
+    estimated: Estimate,
     precision: float | None = None,
 ) -> Evidence:
     """Return the line of a comparison; its note gives the deviation in standard errors."""
-    half = half_band(found.error, exact, found.batches)
-    spread = NORMAL_95 * found.error if found.error > 0 else None
+    half = half_band(estimated.error, exact, estimated.batches)
+    spread = NORMAL_95 * estimated.error if estimated.error > 0 else None
     note = ""
     if spread is not None:
-        note = f"{(found.value - exact) / found.error:+.2f} SE"
-        if found.plain != found.value:
-            note += f", {(found.plain - exact) / found.plain_error:+.2f} without controls"
+        note = f"{(estimated.value - exact) / estimated.error:+.2f} SE"
+        if estimated.plain != estimated.value:
+            note += f", {(estimated.plain - exact) / estimated.plain_error:+.2f} without controls"
     return Evidence(
         "dispatch",
         group,
         f"{case} {claim}",
         claim,
         measured=exact,
-        predicted=found.value,
-        predicted_low=None if spread is None else found.value - spread,
-        predicted_high=None if spread is None else found.value + spread,
+        predicted=estimated.value,
+        predicted_low=None if spread is None else estimated.value - spread,
+        predicted_high=None if spread is None else estimated.value + spread,
         low=exact - half,
         high=exact + half,
-        verdict=verdict(found, exact, precision),
+        verdict=verdict(estimated, exact, precision),
         note=note,
     )
 

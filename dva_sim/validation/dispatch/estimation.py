@@ -122,11 +122,11 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     return left
 
 
-def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
+def verdict(estimated: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
     """Judge whether an estimate agrees with the exact value.
 
     Args:
-        found: The estimate.
+        estimated: The estimate.
         exact: Exact value.
         precision: Standard error asked for, as a share of the exact value; None asks for none.
 
@@ -134,10 +134,15 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
         `misses`: outside its band, with controls or without them. `too rough`: the standard error
         is above what is asked for, so that agreement says little.
     """
-    for value, error in ((found.value, found.error), (found.plain, found.plain_error)):
-        if not abs(value - exact) <= half_band(error, exact, found.batches):
+    for value, error in (
+        (estimated.value, estimated.error),
+        (estimated.plain, estimated.plain_error),
+    ):
+        if not abs(value - exact) <= half_band(error, exact, estimated.batches):
             return "misses"
-    if precision is not None and not found.error <= max(precision * abs(exact), _rounding(exact)):
+    if precision is not None and not estimated.error <= max(
+        precision * abs(exact), _rounding(exact)
+    ):
         return "too rough"
     return "holds"
 
@@ -196,14 +201,14 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     counts = _counts(batches, scenario)
     look, square = _looks(sample, scenario)
     beside = _beside(batches, scenario)
-    found = beside | {"look": batches.total(look, sample.served)}
+    variates = beside | {"look": batches.total(look, sample.served)}
     if counts:
-        found["events"] = sum(counts.values(), np.zeros(len(batches.lengths)))
+        variates["events"] = sum(counts.values(), np.zeros(len(batches.lengths)))
     if not beside:  # which tells all that the others would, and has no such long tails
         if all(stream.between is not None for stream in scenario.demand):
-            found |= _products(batches, scenario, look)
-        found["look_square"] = batches.total(square, sample.served)
-    return found | {f"events@{name}": count for name, count in list(counts.items())[1:]}
+            variates |= _products(batches, scenario, look)
+        variates["look_square"] = batches.total(square, sample.served)
+    return variates | {f"events@{name}": count for name, count in list(counts.items())[1:]}
 
 
 def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
@@ -213,26 +218,26 @@ def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats,
     their means, and their shapes by one value of the Laplace transform. That is a mean of
     numbers between 0 and 1, so that even long tails leave it an honest error.
     """
-    found: dict[str, tuple[Floats, Floats]] = {}
+    variates: dict[str, tuple[Floats, Floats]] = {}
     sample = batches.sample
     for name, surplus in _counts(batches, scenario).items():
         number = scenario.stream_names.index(name)
         came = batches.count(sample.stream == number)
-        found[f"events of {name}"] = came, came - surplus
+        variates[f"events of {name}"] = came, came - surplus
         law = scenario.demand[number].between
         assert law is not None
-        gaps, known = _gaps(sample, number)
-        found[f"gaps of {name}, transform"] = _transforms(batches, [(law, gaps, known)])
+        gaps, is_seen = _gaps(sample, number)
+        variates[f"gaps of {name}, transform"] = _transforms(batches, [(law, gaps, is_seen)])
     took = np.where(sample.served, sample.confirmed - sample.arrived, 0.0)
     looks = batches.total(took, sample.served)
     expected = looks - batches.total(_looks(sample, scenario)[0], sample.served)
     if expected.any():
-        found["looking"] = looks, expected
+        variates["looking"] = looks, expected
         laws = _look_law_of(sample, scenario)
         each = [(law, took, which) for law, which in laws if law.variance > 0]
         if each:
-            found["looking, transform"] = _transforms(batches, each)
-    return found
+            variates["looking, transform"] = _transforms(batches, each)
+    return variates
 
 
 def _transforms(
@@ -254,23 +259,23 @@ def _transform(law: Law) -> float:
 def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
     """Return times from the event before of the same stream, and where they are known."""
     gaps = np.zeros(len(sample.stream))
-    known = np.zeros(len(sample.stream), dtype=bool)
+    is_seen = np.zeros(len(sample.stream), dtype=bool)
     places = np.flatnonzero(sample.stream == number)[1:]
     gaps[places] = np.diff(sample.detected[sample.stream == number])
-    known[places] = True
-    return gaps, known
+    is_seen[places] = True
+    return gaps, is_seen
 
 
 def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     """Return the number of events of each stream above the expectation from its intervals."""
-    found = {}
+    surpluses = {}
     for number, (name, stream) in enumerate(
         zip(scenario.stream_names, scenario.demand, strict=True)
     ):
         if stream.between is not None and stream.between.variance > 0:
             came = batches.count(batches.sample.stream == number)
-            found[name] = came - batches.lengths / stream.between.mean
-    return found
+            surpluses[name] = came - batches.lengths / stream.between.mean
+    return surpluses
 
 
 def _look_law_of(
@@ -371,9 +376,9 @@ def _products(batches: Batches, scenario: TimedScenario, look: Floats) -> dict[s
     step = np.concatenate([[0.0], look[:-1] / len(batches.sample.units)]) - gaps
     step[:1] = 0.0
     everything = np.ones(len(step), dtype=bool)
-    found = {}
+    products = {}
     for length in FADING:
         keep = 1 - 1 / length
         before = np.concatenate([[0.0], lfilter([1.0], [1.0, -keep], step)[:-1]])
-        found[f"row_{length:g}"] = batches.total(step * before, everything)
-    return found
+        products[f"row_{length:g}"] = batches.total(step * before, everything)
+    return products

@@ -91,8 +91,8 @@ def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
     jobs = []
     for first in range(0, order.runs, CHUNK):
         count = min(CHUNK, order.runs - first)
-        asked = order.condition.to_row(), order.depth, order.without, first, count
-        jobs.append(job_of(f"{text}, runs from {first}", seed, None, order=json.dumps(asked)))
+        request = order.condition.to_row(), order.depth, order.without, first, count
+        jobs.append(job_of(f"{text}, runs from {first}", seed, None, order=json.dumps(request)))
     return jobs
 
 
@@ -202,9 +202,9 @@ class NetworkComparison:
     @property
     def judged(self) -> list[ConditionGroup]:
         """The conditions of which at least one measure is judged."""
-        found = {v.cell.group.condition for v in self.verdicts if not v.why}
-        found |= {scored.cell.group.condition for scored in self.pooled.scored}
-        return [group for group in self.groups if group.condition in found]
+        conditions = {v.cell.group.condition for v in self.verdicts if not v.why}
+        conditions |= {scored.cell.group.condition for scored in self.pooled.scored}
+        return [group for group in self.groups if group.condition in conditions]
 
 
 def compare(
@@ -225,7 +225,7 @@ def compare(
     cells = _cells(played, orders.pop(MODEL), rows)
     own = [c for c in cells if c.group.kind == "pooled"]
     pooled = pool(to_be_pooled(own), Streams(setting.seed).fresh("null"))
-    found = {
+    comparisons = {
         name: pool_variant(pooled, _cells(pooled_of(played), variant, rows))
         for name, variant in orders.items()
     }
@@ -235,8 +235,8 @@ def compare(
         verdicts=[judge(c) for c in cells if c.group.kind != "pooled" or is_steady(c)],
         pooled=pooled,
         rarely=[c for c in own if not tells(c)],
-        controls={name: each for name, each in found.items() if name in CONTROLS},
-        ablated={name: each for name, each in found.items() if name in WITHOUT},
+        controls={name: each for name, each in comparisons.items() if name in CONTROLS},
+        ablated={name: each for name, each in comparisons.items() if name in WITHOUT},
     )
 
 

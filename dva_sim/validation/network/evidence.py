@@ -207,26 +207,26 @@ def notes(comparison: NetworkComparison) -> list[str]:
             KINDS, ("without loss", "overloaded", "single", "pooled"), strict=True
         )
     )
-    found = [f"{len(judged)} conditions are judged ({counts})."]
+    lines = [f"{len(judged)} conditions are judged ({counts})."]
     every, pooled = comparison.missing
     if every or pooled:
-        found.append(
+        lines.append(
             f"Wanted beyond these: {every} more conditions, {pooled} more pooled under loss. "
             "`dva-sim validate network --measure FILE` makes them."
         )
     if comparison.pooled.scored:
         chance = 100 * comparison.pooled.false_alarms
-        found.append(
+        lines.append(
             f"If the model were right, something would still be significant in {chance:.0f} % "
             "of such comparisons."
         )
     singles = sum(group.kind == "single" for group in judged)
     if 0 < singles < FEW_SINGLES:
-        found.append(
+        lines.append(
             f"Of single runs under loss there are only {singles}: the measures of a run go "
             "together, so an unlucky one counts for many."
         )
-    return found
+    return lines
 
 
 def variant_rows(comparison: NetworkComparison) -> list[Row]:

@@ -108,10 +108,10 @@ def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
         own: Result of the full model.
         variants: Cells of the variant; those that the model is not judged by are left out.
     """
-    known = {(c.group.condition, c.measure): c for c in variants if len(c.predicted)}
+    cells = {(c.group.condition, c.measure): c for c in variants if len(c.predicted)}
     scored = []
     for each in own.scored:
-        cell = known.get((each.cell.group.condition, each.cell.measure))
+        cell = cells.get((each.cell.group.condition, each.cell.measure))
         if cell is not None:
             scored.append(score(cell, each.error))
     return _judged(scored, own.expected, own.false_alarms)
@@ -138,11 +138,11 @@ def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
 
 
 def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
-    found = holm([s.p for s in scored]) <= SIGNIFICANT
+    significant = holm([s.p for s in scored]) <= SIGNIFICANT
     offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
     return Pooled(
         tuple(scored),
-        tuple(s for s, is_significant in zip(scored, found, strict=True) if is_significant),
+        tuple(s for s, is_significant in zip(scored, significant, strict=True) if is_significant),
         float(np.sqrt(np.mean([s.z**2 for s in scored]))) if scored else 0.0,
         expected,
         false_alarms,

@@ -200,15 +200,15 @@ def conditions_of(block: BlockConfig) -> list[Condition]:
     Raises:
         ConfigError: a setting that no condition has.
     """
-    found = []
+    conditions = []
     for link in block.links.values():
         for programs in block.programs.values():
             settings = {**block.settings, **link, **programs}
             if odd := settings.keys() - set(CONDITION):
                 raise ConfigError(unknown("setting", min(odd), CONDITION))
             try:
-                found.append(Condition.from_row(settings))
+                conditions.append(Condition.from_row(settings))
             except TypeError:
                 problem = f"block {block.group!r} does not say which pattern and how many hz"
                 raise ConfigError(problem) from None
-    return found
+    return conditions

@@ -175,10 +175,10 @@ def values_of(row: Row) -> dict[str, float]:
     sent = row["n_sent"]
     rate = row["applied_hz"]
     age = row["age_mean"]
-    found = {m.name: row[m.name] for m in MEASURES if m.name in row}
-    found["delivered"] = row["n_distinct"] / sent if sent else math.nan
-    found["queue"] = rate * age / 1000.0 if rate else 0.0
-    return found
+    values = {m.name: row[m.name] for m in MEASURES if m.name in row}
+    values["delivered"] = row["n_distinct"] / sent if sent else math.nan
+    values["queue"] = rate * age / 1000.0 if rate else 0.0
+    return values
 
 
 @dataclass(frozen=True)
@@ -219,8 +219,8 @@ def cells_of(group: ConditionGroup, predicted: Sequence[Row]) -> list[ComparedCe
     """
     real = [values_of(run.values) for run in group.runs]
     model = [values_of(row) for row in predicted]
-    asked = MEASURES if group.condition.pattern == "req-rep" else MEASURES[:-2]
-    cells = [ComparedCell(group, m, _column(real, m), _column(model, m)) for m in asked]
+    measures = MEASURES if group.condition.pattern == "req-rep" else MEASURES[:-2]
+    cells = [ComparedCell(group, m, _column(real, m), _column(model, m)) for m in measures]
     return [cell for cell in cells if len(cell.measured) or len(cell.predicted)]
 
 

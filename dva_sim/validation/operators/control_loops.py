@@ -100,11 +100,11 @@ def pure_pursuit(speed_delay: float) -> list[float]:
     errors = []
     for step in range(DELAYS * STEPS):
         seen = Observation(0, *frames[0], speed=0.0, turn_rate=0.0, hazards=())
-        wanted = pursuit.drive(route, View(step * dt, seen, 1.0), 0.0)
-        middle = heading + 0.5 * wanted.turn_rate * dt
-        x = x + wanted.speed * math.cos(middle) * dt
-        y = y + wanted.speed * math.sin(middle) * dt
-        heading += wanted.turn_rate * dt
+        intent = pursuit.drive(route, View(step * dt, seen, 1.0), 0.0)
+        middle = heading + 0.5 * intent.turn_rate * dt
+        x = x + intent.speed * math.cos(middle) * dt
+        y = y + intent.speed * math.sin(middle) * dt
+        heading += intent.turn_rate * dt
         frames.append((x, y, heading))
         errors.append(y)
     return errors

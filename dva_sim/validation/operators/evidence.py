@@ -47,7 +47,7 @@ BY = {
 
 def evidence(
     lines: Sequence[TargetLine],
-    found: Mapping[str, Found],
+    simulated: Mapping[str, Found],
     rule: RuleConfig,
     *,
     played: Mapping[str, Cells],
@@ -57,12 +57,12 @@ def evidence(
 
     Args:
         lines: Published numbers.
-        found: Simulated numbers by the line's id.
+        simulated: Simulated numbers by the line's id.
         rule: Shares that must hold.
         played: The trials of each experiment.
         conditions: Conditions of the runs, by name.
     """
-    verdicts = judge(lines, found)
+    verdicts = judge(lines, simulated)
     return ValidationResult(
         [
             *sorted(verdicts, key=lambda line: list(GROUPS.values()).index(line.group)),
@@ -83,13 +83,13 @@ def evidence(
     )
 
 
-def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[Evidence]:
+def judge(lines: Sequence[TargetLine], simulated: Mapping[str, Found]) -> list[Evidence]:
     """Return a verdict for each line; what was not simulated is nan, and misses."""
-    return [_judged(line, found.get(line.id, certain(math.nan))) for line in lines]
+    return [_judged(line, simulated.get(line.id, certain(math.nan))) for line in lines]
 
 
-def _judged(line: TargetLine, found: Found) -> Evidence:
-    inside = line.holds(found.value) and line.is_sure(found.low, found.high)
+def _judged(line: TargetLine, simulated: Found) -> Evidence:
+    inside = line.holds(simulated.value) and line.is_sure(simulated.low, simulated.high)
     is_counted = line.kind in COUNTED
     notes = []
     if not is_counted:
@@ -98,7 +98,7 @@ def _judged(line: TargetLine, found: Found) -> Evidence:
         )
     for side, limit in (("above", line.above), ("below", line.below)):
         notes += [f"surely {side} {limit:g}"] if limit is not None else []
-    if found.value in TRIED.get(line.id, ()):
+    if simulated.value in TRIED.get(line.id, ()):
         notes.append("at the edge of what was tried")
     return Evidence(
         "operators",
@@ -108,12 +108,12 @@ def _judged(line: TargetLine, found: Found) -> Evidence:
         source=f"{line.metric}: {line.source} [{line.tag}]",
         unit=line.unit,
         measured=line.target,
-        predicted=found.value,
-        predicted_low=found.low if found.persons else None,
-        predicted_high=found.high if found.persons else None,
+        predicted=simulated.value,
+        predicted_low=simulated.low if simulated.persons else None,
+        predicted_high=simulated.high if simulated.persons else None,
         low=line.low,
         high=line.high,
-        sample=found.persons,
+        sample=simulated.persons,
         verdict=("holds" if inside else "misses") if is_counted else "shown only",
         note=", ".join(notes),
     )

@@ -47,13 +47,13 @@ PPM = (30, 50, 100, 300)
 def fires() -> Values:
     """Return times at which each class of fire reaches 1055 kW [s]."""
     times = np.arange(0.0, 700.0, 0.05)
-    found = {}
+    times_s = {}
     for growth in GROWTH_S:
         fire = make_hazard("fire", (0.0, 0.0), 0.0, growth=growth)
         assert isinstance(fire, Fire)
         heat = np.array([fire.heat_release(float(t)) for t in times])
-        found[growth] = float(times[np.argmax(heat >= FULL_GROWTH_KW * (1.0 - 1e-9))])
-    return found
+        times_s[growth] = float(times[np.argmax(heat >= FULL_GROWTH_KW * (1.0 - 1e-9))])
+    return times_s
 
 
 def helpers(seed: int) -> Values:

@@ -560,11 +560,11 @@ def measured(
     experiments: Sequence[Experiment], played: Mapping[str, Cells], seed: int
 ) -> dict[str, Found]:
     """Return the value of each line with its interval, by its id."""
-    found: dict[str, Found] = {}
+    estimates: dict[str, Found] = {}
     for experiment in experiments:
         rng = Streams(seed).fresh(f"resampling/{experiment.name}")
-        found |= with_intervals(experiment.measure, played[experiment.name], rng)
-    return found
+        estimates |= with_intervals(experiment.measure, played[experiment.name], rng)
+    return estimates
 
 
 def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
@@ -588,9 +588,9 @@ def perform(job: StudyJob) -> Tables:
 
 def _asked_person(job: StudyJob) -> Person:
     """Return the person for a job, drawn from the population that it names."""
-    asked = job.levels
-    everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
-    return draw_person(everybody, int(str(asked["population"])), job.person)
+    levels = job.levels
+    everybody = population(OperatorConfig()).with_medians(json.loads(str(levels["traits"])))
+    return draw_person(everybody, int(str(levels["population"])), job.person)
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:

@@ -78,9 +78,9 @@ def _moving(curves: Mapping[str, CurveConfig], cells: Cells) -> Drawn:
         (every, curves["lag"], ratios, "time, none added = 1", "All targets"),
         (slow, curves["lag-slow"], slowest, "time, none added = 1", "Slow targets"),
     )
-    for axes, curve, found, label, title in panels_of:
+    for axes, curve, values, label, title in panels_of:
         _people(axes, curve)
-        _ours(axes, added, found, log=True)
+        _ours(axes, added, values, log=True)
         axes.set(xlabel="added lag [s]", ylabel=label, title=title)
     _people(presses, curves["presses"])
     _ours(presses, added, clicks)

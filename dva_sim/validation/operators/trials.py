@@ -47,8 +47,8 @@ class Trials:
     def by(self, *names: str) -> list[tuple[tuple[float, ...], Trials]]:
         """Return the trials of each combination of values of some columns, in rising order."""
         keys = np.column_stack([self.columns[name] for name in names])
-        found = np.unique(keys, axis=0)
-        return [(tuple(key.tolist()), self.where((keys == key).all(axis=1))) for key in found]
+        distinct = np.unique(keys, axis=0)
+        return [(tuple(key.tolist()), self.where((keys == key).all(axis=1))) for key in distinct]
 
     def drawn(self, persons: Ints) -> Trials:
         """Return the trials of some persons, who count as often as they are drawn."""
@@ -124,20 +124,20 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
 
 def _middle(draws: Sequence[float]) -> tuple[float, float]:
     """Return the central interval of the draws, nan excluded."""
-    known = [draw for draw in draws if not math.isnan(draw)]
-    if not known:
+    finite = [draw for draw in draws if not math.isnan(draw)]
+    if not finite:
         return math.nan, math.nan
     tail = 0.5 * (1.0 - LEVEL)
-    low, high = np.quantile(known, [tail, 1.0 - tail])
+    low, high = np.quantile(finite, [tail, 1.0 - tail])
     return float(low), float(high)
 
 
 def person_means(trials: Trials, name: str) -> Floats:
     """Return the mean of each person `(persons,)`, without what is missing."""
     values = trials[name]
-    known = np.isfinite(trials[name])
-    total = np.bincount(trials.person[known], values[known])
-    count = np.bincount(trials.person[known])
+    is_finite = np.isfinite(trials[name])
+    total = np.bincount(trials.person[is_finite], values[is_finite])
+    count = np.bincount(trials.person[is_finite])
     return np.asarray(total[count > 0] / count[count > 0])
 
 

@@ -96,8 +96,8 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
             TypeError: `reported_as` or `shows` has a word that nobody knows.
         """
         if cls.reported_as not in EVENT_KINDS:
-            known = ", ".join(EVENT_KINDS)
-            raise TypeError(f"reported_as of {cls.__name__} should be one of {known}")
+            kinds = ", ".join(EVENT_KINDS)
+            raise TypeError(f"reported_as of {cls.__name__} should be one of {kinds}")
         if not set(cls.shows) <= set(QUANTITIES):
             raise TypeError(f"shows of {cls.__name__} should be some of {', '.join(QUANTITIES)}")
 
@@ -306,7 +306,7 @@ def _first(
         return best
     field = hazard.model_copy(update={"start": 0.0}).field(site)
     alarms = [(d, field.alarm(d.kind, d.x, d.y)) for d in detectors]
-    best = min(((d, alarm.at_latest) for d, alarm in alarms), key=lambda found: found[1])
+    best = min(((d, alarm.at_latest) for d, alarm in alarms), key=lambda entry: entry[1])
     for age, dt in _ages():
         if age >= best[1]:
             break

@@ -63,14 +63,14 @@ class Corrections:
         """Time from the beginning to the middle of a correction [s]."""
         return 0.5 * self._habits.grows_s * self._tempo
 
-    def steer(self, now: float, wanted: float) -> float:
+    def steer(self, now: float, rate: float) -> float:
         """Return the turn rate to ask for, if so much is wanted now [rad/s]."""
         grows = self._habits.grows_s * self._tempo
         share = (now - self._begun) / grows
         if share >= 1.0:
             self._from = self._to
             passed = max(now - self._last, 0.0)
-            error = wanted - self._to
+            error = rate - self._to
             hardly = self._habits.unnoticed * abs(self._to)
             self._evidence += math.copysign(max(abs(error) - hardly, 0.0), error) * passed
             self._errors += error * passed
@@ -124,19 +124,19 @@ class Adaptive(Strategy):
         left = max(route.remaining(seen.x, seen.y) - stop_before, 0.0)
         self._choose(view.now, self._prefers_to_wait(left, view.delay))
         if self.using != "closed":
-            wanted = self._moves.drive(route, view, stop_before)
+            intent = self._moves.drive(route, view, stop_before)
         elif self._closed is not None:
-            wanted = self._closed.drive(route, view, stop_before)
+            intent = self._closed.drive(route, view, stop_before)
         else:
             late = 0.5 * self.period.likely + self._corrections.late
-            wanted = self._pursuit.drive(route, view._replace(delay=view.delay + late), stop_before)
-            turn = self._corrections.steer(view.now, wanted.turn_rate)
-            wanted = Intent(wanted.speed, turn)
-        self._has_asked = self._has_asked or any(wanted)
+            intent = self._pursuit.drive(route, view._replace(delay=view.delay + late), stop_before)
+            turn = self._corrections.steer(view.now, intent.turn_rate)
+            intent = Intent(intent.speed, turn)
+        self._has_asked = self._has_asked or any(intent)
         self.period.intend(
-            view.now, wanted.speed / reach.speed, wanted.turn_rate / max(reach.turn_rate, 1e-3)
+            view.now, intent.speed / reach.speed, intent.turn_rate / max(reach.turn_rate, 1e-3)
         )
-        return wanted
+        return intent
 
     @override
     def point(self, view: PointView) -> Velocity:
@@ -161,9 +161,9 @@ class Adaptive(Strategy):
         count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
         ratio = (left / pace) / self._waiting(left, count, view.delay)
         self._choose(view.now, ratio * self._unease(view.delay))
-        wanted = self._now.follow(view)
-        self._has_asked = self._has_asked or any(wanted)
-        return wanted
+        velocity = self._now.follow(view)
+        self._has_asked = self._has_asked or any(velocity)
+        return velocity
 
     def workload(self) -> Mapping[str, float]:
         """Return how often the person waited, and the share of time it moved and waited."""

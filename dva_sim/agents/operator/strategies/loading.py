@@ -75,16 +75,16 @@ def load_strategy(
             not a strategy; a bad option is reported when it is made.
     """
     factory = PLUGINS.find(name, base)
-    given = dict(options or {})
+    own_options = dict(options or {})
     word = word_of(name)
 
     def make(person: Person, reach: Reach) -> Driver:
         used: dict[str, Any] = {}
         option = getattr(factory, "uses", "")
-        if option in given:
-            load = partial(_load_used, option, given[option], person, reach)
+        if option in own_options:
+            load = partial(_load_used, option, own_options[option], person, reach)
             used[option] = PLUGINS.ask(word, load)
-        made = PLUGINS.make(word, factory, given | used, person, reach)
+        made = PLUGINS.make(word, factory, own_options | used, person, reach)
         is_shipped = factory in STRATEGIES.values()
         return made if is_shipped else PLUGINS.ask(word, partial(_guarded, made))
 

@@ -171,20 +171,20 @@ class MoveAndWait(Strategy):
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         seen = view.seen
         left = route.remaining(seen.x, seen.y)  # kept track of in moves
-        wanted = self.moves.next(view.now, view.delay, self._pace(seen.speed, seen.turn_rate))
-        if wanted is None:
+        command = self.moves.next(view.now, view.delay, self._pace(seen.speed, seen.turn_rate))
+        if command is None:
             parts = self._way(route, seen, left, stop_before)
             peak = max((self._pace(*part[1:]) for part in parts), default=0.0)
-            wanted = self.moves.begin(view.now, parts, peak) if parts else (0.0, 0.0)
-        return Intent(*wanted)
+            command = self.moves.begin(view.now, parts, peak) if parts else (0.0, 0.0)
+        return Intent(*command)
 
     @override
     def point(self, view: PointView) -> Velocity:
         # A moving target is led by the time until the move is seen.
         seen = view.seen
-        wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
-        if wanted is not None:
-            return wanted
+        velocity = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
+        if velocity is not None:
+            return velocity
         dx = seen.target_x - seen.x
         dy = seen.target_y - seen.y
         lead = view.delay + self._lasting(math.hypot(dx, dy), self._most)
@@ -199,9 +199,9 @@ class MoveAndWait(Strategy):
         seen = view.seen
         path = view.path
         left = path.remaining(seen.x, seen.y)
-        wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
-        if wanted is not None:
-            return wanted
+        velocity = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
+        if velocity is not None:
+            return velocity
         if left <= 0.0:
             return 0.0, 0.0
         along = path.length - left

@@ -66,17 +66,17 @@ class Predictor(Strategy):
     @override
     def point(self, view: PointView) -> Velocity:
         seen = self._cursor(view.seen, view.now, view.delay)
-        wanted = self._inner.point(PointView(view.now, seen, self._left(view.delay)))
-        self._asked.append((view.now, *wanted))
-        return wanted
+        velocity = self._inner.point(PointView(view.now, seen, self._left(view.delay)))
+        self._asked.append((view.now, *velocity))
+        return velocity
 
     @override
     def follow(self, view: PathView) -> Velocity:
         seen = self._cursor(view.seen, view.now, view.delay)
         predicted = PathView(view.now, seen, self._left(view.delay), view.path)
-        wanted = self._inner.follow(predicted)
-        self._asked.append((view.now, *wanted))
-        return wanted
+        velocity = self._inner.follow(predicted)
+        self._asked.append((view.now, *velocity))
+        return velocity
 
     def workload(self) -> Mapping[str, float]:
         """Return the workload of the inner strategy."""
@@ -125,13 +125,13 @@ class Predictor(Strategy):
 
     def _unseen(self, now: float, delay: float) -> list[tuple[float, float, float]]:
         """Return the requests since `now - delay`: for how long [s], and what."""
-        asked = self._asked
+        commands = self._asked
         since = now - delay
         end = now
-        while len(asked) > 1 and asked[1][0] < now - self._remembers:
-            asked.popleft()
+        while len(commands) > 1 and commands[1][0] < now - self._remembers:
+            commands.popleft()
         pieces = []
-        for at, one, other in reversed(asked):
+        for at, one, other in reversed(commands):
             if end <= since:
                 break
             pieces.append((end - max(at, since), one, other))

@@ -132,9 +132,9 @@ class Submovements:
         ):
             self._plan(now, dx, dy, seen.tolerance, noise)
         vx, vy = self._moving(now)
-        wanted = slowed(vx + target_vx, vy + target_vy, self._most)
-        self._asked.append((now, *wanted))
-        return wanted
+        velocity = slowed(vx + target_vx, vy + target_vy, self._most)
+        self._asked.append((now, *velocity))
+        return velocity
 
     def presses(self, now: float, seen: Sighting, delay: float, hurried: bool) -> bool:
         """Press the button: the prediction is on the target, and so is the eye where it must be.
@@ -205,10 +205,10 @@ class Submovements:
         hand = self._person.hand_lag
         dead = max(counted - hand, 0.0)
         self._unseen = 0.0
-        asked = self._asked
-        while len(asked) > 1 and asked[1][0] < now - dead - 5.0 * hand:
-            asked.popleft()
-        for at, vx, vy in reversed(asked):
+        commands = self._asked
+        while len(commands) > 1 and commands[1][0] < now - dead - 5.0 * hand:
+            commands.popleft()
+        for at, vx, vy in reversed(commands):
             age = now - 0.5 * (at + until) - dead
             lasts = (until - at) * (1.0 if age <= 0.0 else math.exp(-age / hand))
             self._unseen += lasts * math.hypot(vx - seen.target_vx, vy - seen.target_vy)

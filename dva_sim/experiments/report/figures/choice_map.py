@@ -48,15 +48,20 @@ class ChoiceMapFigure(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw a row for each situation and a column for each choice, or the other way round."""
-        found = reading.map
-        if found is None:
+        choice_map = reading.map
+        if choice_map is None:
             return None
-        choices = [level_name(found.choice.name, x, short=True) for x in found.choice.levels]
-        situations = [*(situation_name(found, g) for g in range(len(found.given.levels))), WORST]
-        across, down = (situations, choices) if found.is_tall else (choices, situations)
+        choices = [
+            level_name(choice_map.choice.name, x, short=True) for x in choice_map.choice.levels
+        ]
+        situations = [
+            *(situation_name(choice_map, g) for g in range(len(choice_map.given.levels))),
+            WORST,
+        ]
+        across, down = (situations, choices) if choice_map.is_tall else (choices, situations)
         figure, ((ax,),) = style.panels(1, 1, 1.2 + _ROW * len(down))
         ax.set_xlim(-0.5, len(across) - 0.5)
-        _paint(ax, found)
+        _paint(ax, choice_map)
         width = min(14, _ACROSS // len(across))
         ax.set_xticks(range(len(across)), [style.wrapped(name, width) for name in across])
         ax.xaxis.tick_top()
@@ -64,34 +69,34 @@ class ChoiceMapFigure(style.ReportFigure):
         ax.set_ylim(len(down) - 0.4, -0.5)
         ax.grid(False)
         ax.tick_params(length=0)
-        unit = f" [{found.unit}]" if found.unit else ""
+        unit = f" [{choice_map.unit}]" if choice_map.unit else ""
         key = f"Beyond the best choice{unit}. Shaded: worse, by the simultaneous 95 % band"
         figure.supxlabel(key, fontsize=_WORDS, color=SOFT)
-        words = caption("map", **facts_of(found))
+        words = caption("map", **facts_of(choice_map))
         title = (
-            f"{capital(measure_name(found.measure))} beyond the best choice{unit}, by "
-            f"{factor_name(found.given.name)}"
+            f"{capital(measure_name(choice_map.measure))} beyond the best choice{unit}, by "
+            f"{factor_name(choice_map.given.name)}"
         )
-        return self.finish(figure, words, _numbers(found), title=title)
+        return self.finish(figure, words, _numbers(choice_map), title=title)
 
 
-def _paint(ax: Axes, found: ChoiceMap) -> None:
-    last = len(found.given.levels)
-    for (g, c), worst in np.ndenumerate(found.worst):
-        is_best = bool(found.is_best[g, c])
-        shade = _shade(found, float(worst), is_plain=not found.is_shaded[g, c])
-        _cell(ax, _place(found, g, c), shade, regret_text(found, g, c), is_best)
-    border = ax.axvline if found.is_tall else ax.axhline
+def _paint(ax: Axes, choice_map: ChoiceMap) -> None:
+    last = len(choice_map.given.levels)
+    for (g, c), worst in np.ndenumerate(choice_map.worst):
+        is_best = bool(choice_map.is_best[g, c])
+        shade = _shade(choice_map, float(worst), is_plain=not choice_map.is_shaded[g, c])
+        _cell(ax, _place(choice_map, g, c), shade, regret_text(choice_map, g, c), is_best)
+    border = ax.axvline if choice_map.is_tall else ax.axhline
     border(last - 0.5, color=SOFT, linewidth=0.8)
-    for c, worst in enumerate(found.overall):
-        is_best = found.choice.levels[c] == found.advised
-        shade = _shade(found, float(worst), is_plain=False)
-        _cell(ax, _place(found, last, c), shade, overall_text(found, c), is_best)
+    for c, worst in enumerate(choice_map.overall):
+        is_best = choice_map.choice.levels[c] == choice_map.advised
+        shade = _shade(choice_map, float(worst), is_plain=False)
+        _cell(ax, _place(choice_map, last, c), shade, overall_text(choice_map, c), is_best)
 
 
-def _place(found: ChoiceMap, situation: int, choice: int) -> tuple[int, int]:
+def _place(choice_map: ChoiceMap, situation: int, choice: int) -> tuple[int, int]:
     """Return the column and row of a cell."""
-    return (situation, choice) if found.is_tall else (choice, situation)
+    return (situation, choice) if choice_map.is_tall else (choice, situation)
 
 
 def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bool) -> None:
@@ -114,26 +119,26 @@ def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bo
     )
 
 
-def _shade(found: ChoiceMap, worst: float, is_plain: bool) -> float:
+def _shade(choice_map: ChoiceMap, worst: float, is_plain: bool) -> float:
     """Return the strength of the colour, by the logarithm of the regret.
 
     None where none was shown.
     """
-    least = max(found.smallest, 1e-9)
+    least = max(choice_map.smallest, 1e-9)
     if is_plain or worst <= least:
         return 0.0
     share = min(1.0, np.log10(worst / least) / _DECADES)
     return float(_FAINT + (_STRONG - _FAINT) * share)
 
 
-def _numbers(found: ChoiceMap) -> Numbers:
+def _numbers(choice_map: ChoiceMap) -> Numbers:
     numbers = Numbers()
-    for (g, c, m), regret in np.ndenumerate(found.regret):
+    for (g, c, m), regret in np.ndenumerate(choice_map.regret):
         where = {
-            found.given.name: found.given.levels[g],
-            found.choice.name: found.choice.levels[c],
-            found.models.name: found.models.levels[m],
+            choice_map.given.name: choice_map.given.levels[g],
+            choice_map.choice.name: choice_map.choice.levels[c],
+            choice_map.models.name: choice_map.models.levels[m],
         }
-        columns = in_units(found.measure, mean=found.mean[g, c, m], regret=regret)
-        numbers.row(where, **columns, is_clear=bool(found.is_clear[g, c, m]))
+        columns = in_units(choice_map.measure, mean=choice_map.mean[g, c, m], regret=regret)
+        numbers.row(where, **columns, is_clear=bool(choice_map.is_clear[g, c, m]))
     return numbers

@@ -73,13 +73,13 @@ def _axes(rows: int) -> tuple[Drawing, Axes]:
 
 
 def _mark(ax: Axes, row: int, claim: Tested) -> None:
-    found = claim.difference
-    assert found is not None
+    difference = claim.difference
+    assert difference is not None
     face = ONE.colour if claim.verdict in _FILLED else PAPER
-    ax.hlines(row, found.low, found.high, color=ONE.colour, lw=2.5)
-    ax.plot(found.mean, row, "o", ms=9, color=face, mec=ONE.colour, mew=2, zorder=3)
-    text = signed(found.mean, unit_of(claim.contrast.measure))
-    ax.annotate(text, (found.mean, row), (0, 9), textcoords="offset points", ha="center")
+    ax.hlines(row, difference.low, difference.high, color=ONE.colour, lw=2.5)
+    ax.plot(difference.mean, row, "o", ms=9, color=face, mec=ONE.colour, mew=2, zorder=3)
+    text = signed(difference.mean, unit_of(claim.contrast.measure))
+    ax.annotate(text, (difference.mean, row), (0, 9), textcoords="offset points", ha="center")
 
 
 def _claimed(ax: Axes, row: int, claim: Tested) -> None:
@@ -97,9 +97,9 @@ def _claimed(ax: Axes, row: int, claim: Tested) -> None:
 def _numbers(tested: Sequence[Tested]) -> Numbers:
     numbers = Numbers()
     for claim in tested:
-        found = claim.difference
-        assert found is not None
-        edges = {"mean": found.mean, "low": found.low, "high": found.high}
+        difference = claim.difference
+        assert difference is not None
+        edges = {"mean": difference.mean, "low": difference.low, "high": difference.high}
         claimed = {"direction": claim.hypothesis.direction, "margin": claim.hypothesis.margin}
         columns = in_units(claim.contrast.measure, **edges)
         numbers.row({"hypothesis": claim.name}, **claimed, **columns, verdict=claim.verdict)

@@ -110,11 +110,11 @@ class Brought(style.ReportFigure):
         return self.finish(figure, caption("brought"), _numbers(view, there))
 
 
-def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
+def _numbers(view: StudyView, measures: Sequence[ShownMeasure]) -> Numbers:
     """Return means over persons and the middle 90 % of them, in the units of the table of runs."""
     numbers = Numbers()
     panel = view.panels[0]
-    grids = {each.column: view.part.grid(each.column) for each in shown}
+    grids = {each.column: view.part.grid(each.column) for each in measures}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
         columns: dict[str, Floats] = {}
@@ -125,30 +125,30 @@ def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
     return numbers
 
 
-def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
-    grid = shown.scale * view.part.grid(shown.column)
+def _panel(ax: Axes, view: StudyView, measure: ShownMeasure) -> None:
+    grid = measure.scale * view.part.grid(measure.column)
     count = len(view.lines)
     for index, (level, look) in enumerate(looks(view.line).items()):
         values = person_means(view.curve(grid, view.panels[0], level))
         place = WIDTH * ((index + 0.5) / count - 0.5)
         _marks(ax, place, values, look)
-    scale = ", log scale" if shown.is_log else ""
-    ax.set_title(f"{shown.title}{scale}", fontweight="normal")
+    scale = ", log scale" if measure.is_log else ""
+    ax.set_title(f"{measure.title}{scale}", fontweight="normal")
     style.stops_axis(ax, view.over)
-    if shown.is_log:
+    if measure.is_log:
         style.log_axis(ax)
     else:
         ax.set_ylim(bottom=0)
-    if shown.column.startswith(("share_of_fair", "jain")):
+    if measure.column.startswith(("share_of_fair", "jain")):
         ax.axhline(1.0, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
 
 
 def _middle(values: Floats) -> Floats:
     """Return ends of the middle 90 % of persons at each stop: `(2, stops)`."""
-    found = np.full((2, values.shape[1]), np.nan)
+    ends = np.full((2, values.shape[1]), np.nan)
     there = np.isfinite(values).any(axis=0)
-    found[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
-    return found
+    ends[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
+    return ends
 
 
 def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:

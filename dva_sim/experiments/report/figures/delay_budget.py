@@ -77,9 +77,9 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
     they were sent, the phone alone would have filled that time with all of them.
     """
     part = view.part
-    found = {name: part.grid(name) for name in _NAMES if part.has(name)}
+    stages = {name: part.grid(name) for name in _NAMES if part.has(name)}
     if not part.has("delay_sampling_s"):
-        return found
+        return stages
     in_force = part.grid("delay_sampling_s")
     wait = np.zeros_like(part.grid("delay_sampling_s"))
     if part.has("commands_superseded"):
@@ -91,8 +91,8 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
         unsent = np.maximum(replaced - np.maximum(sent - applied - stale, 0.0), 0.0)
         wait = in_force * unsent / np.maximum(sent + unsent, 1.0)
     before = part.grid("delay_pattern_s") if part.has("delay_pattern_s") else 0.0
-    found |= {"delay_period_s": in_force - wait, "delay_wait_s": wait + before}
-    return {name: found[name] for name in _NAMES if name in found}
+    stages |= {"delay_period_s": in_force - wait, "delay_wait_s": wait + before}
+    return {name: stages[name] for name in _NAMES if name in stages}
 
 
 def _driven(view: StudyView, grid: Floats) -> StudyView:

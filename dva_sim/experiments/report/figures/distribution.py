@@ -36,15 +36,15 @@ class Distributions(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        shown = view.shown
+        panels = view.shown
         figure, axes = style.panels(
-            len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True
+            len(panels), 1, 2.7 if len(panels) < 3 else 2.2, sharex=True, sharey=True
         )
         look = looks(view.line)
         raw = view.part.grid(view.measure)
         confirmed = _confirmed(view)
         numbers = Numbers()
-        for (ax,), panel in zip(axes, shown, strict=True):
+        for (ax,), panel in zip(axes, panels, strict=True):
             for level, offset in style.dodge(view.lines):
                 values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
                 ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0

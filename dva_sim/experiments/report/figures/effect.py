@@ -54,9 +54,9 @@ class Differences(style.ReportFigure):
         name = level_name(view.line.name, baseline)
         label = style.axis_label(view.measure, f"Difference against\n{name}")
         figure, axes, ends, bars, cut, numbers = _curves(view, others, baseline, label)
-        for ax, found in zip(axes, there, strict=True):
+        for ax, finding in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
-            mark_boundary(ax, view.over, found)
+            mark_boundary(ax, view.over, finding)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         mark_cuts(bars)
         _name(view, others, figure, axes, ends)
@@ -67,7 +67,7 @@ class Differences(style.ReportFigure):
             baseline=name,
             zoomed=zoomed,
             is_marked=view.smallest_effect is not None,
-            has_boundary=any(boundary(view.over, found) is not None for found in there),
+            has_boundary=any(boundary(view.over, finding) is not None for finding in there),
         )
         reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
         return self.finish(figure, words, numbers, title=title, reads=reads)
@@ -75,10 +75,10 @@ class Differences(style.ReportFigure):
 
 def _few_words(reading: Reading) -> str:
     """Warn that overlapping bars show no equality when there are too few persons."""
-    found = getattr(reading, "worded_finding", None)
-    if found is None or not found.has_too_few:
+    finding = getattr(reading, "worded_finding", None)
+    if finding is None or not finding.has_too_few:
         return ""
-    few = capital(too_few(found.persons, found.cluster))
+    few = capital(too_few(finding.persons, finding.cluster))
     return f"{few}: bars that overlap or include zero do not show equality."
 
 

@@ -116,9 +116,9 @@ def _field(
 ) -> EffectField:
     columns = [view.difference(panel | {second.name: x}, *contrast) for x in second.levels]
     values = np.stack(columns, axis=1)  # (persons, levels of the second, stops)
-    found = band(values.reshape(len(values), -1))
+    bands = band(values.reshape(len(values), -1))
     shape = values.shape[1:]
-    mean, low, high = (x.reshape(shape) for x in (found.mean, found.low, found.high))
+    mean, low, high = (x.reshape(shape) for x in (bands.mean, bands.low, bands.high))
     return EffectField(second, panel, mean, low, high)
 
 
@@ -131,11 +131,11 @@ def _second(view: StudyView) -> Factor | None:
     return max(worth, key=lambda f: (len(f.levels), f.is_numeric), default=None)
 
 
-def _colours(ax: Axes, shown: Floats, reach: float) -> QuadMesh:
+def _colours(ax: Axes, values: Floats, reach: float) -> QuadMesh:
     """Return fields from purple, below zero, over white to orange: far apart for every eye."""
     return ax.pcolormesh(
-        *np.meshgrid(np.arange(shown.shape[1] + 1) - 0.5, np.arange(shown.shape[0] + 1) - 0.5),
-        np.ma.masked_invalid(shown),
+        *np.meshgrid(np.arange(values.shape[1] + 1) - 0.5, np.arange(values.shape[0] + 1) - 0.5),
+        np.ma.masked_invalid(values),
         cmap=DIVERGING,
         vmin=-reach,
         vmax=reach,
@@ -174,8 +174,8 @@ def _contours(ax: Axes, field: EffectField) -> bool:
         (field.low, "--", 1),
         (field.high, "--", 1),
     ):
-        known = values[np.isfinite(values)]
-        crosses = len(known) > 0 and known.min() < 0 < known.max()
+        finite = values[np.isfinite(values)]
+        crosses = len(finite) > 0 and finite.min() < 0 < finite.max()
         if crosses and min(values.shape) > 1:
             ax.contour(
                 np.ma.masked_invalid(values), [0.0], colors=INK, linestyles=dashes, linewidths=width

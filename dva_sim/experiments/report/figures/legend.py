@@ -66,9 +66,11 @@ def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None
     if factor is None:
         return
     look = looks(factor)
-    shown = factor.levels if levels is None else levels
-    handles = [Line2D([], [], color=look[v].colour, marker=look[v].mark, ls="") for v in shown]
-    key(figure, handles, [level_name(factor.name, level) for level in shown])
+    levels_shown = factor.levels if levels is None else levels
+    handles = [
+        Line2D([], [], color=look[v].colour, marker=look[v].mark, ls="") for v in levels_shown
+    ]
+    key(figure, handles, [level_name(factor.name, level) for level in levels_shown])
 
 
 def box(fill: Fill) -> Artist:

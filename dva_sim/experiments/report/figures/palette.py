@@ -144,8 +144,8 @@ def looks(factor: Factor | None) -> dict[Level, Look]:
     taken = {look.colour for look in own.values()}
     free = [look for look in _FREE if look.colour not in taken] or list(_FREE)
     others = [level for level in factor.levels if level not in own]
-    found = own | {level: free[i % len(free)] for i, level in enumerate(others)}
-    return {level: found[level] for level in factor.levels}
+    look_by_level = own | {level: free[i % len(free)] for i, level in enumerate(others)}
+    return {level: look_by_level[level] for level in factor.levels}
 
 
 def colours(factor: Factor | None) -> dict[Level, str]:
@@ -157,7 +157,7 @@ def is_of_palette(colour: str) -> bool:
     """Return True if a colour, as `#rrggbb`, may be used in figures."""
     own = [INK, SOFT, FAINT, WARNING, HAZARD, "#ffffff", *(look.colour for look in LOOKS)]
     fills = [fill.colour for kind in (FATES, STAGES) for fill in kind.values()]
-    return colour.lower() in {known.lower() for known in (*own, *fills)}
+    return colour.lower() in {own_colour.lower() for own_colour in (*own, *fills)}
 
 
 def look_of(name: str) -> Look:

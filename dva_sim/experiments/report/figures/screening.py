@@ -19,21 +19,21 @@ FIGURE = "screening.png"
 _ROW = 0.42  # height of a number [in]
 
 
-def draw_screening(study: Study, found: Screening, folder: Path) -> Iterator[str]:
+def draw_screening(study: Study, screening: Screening, folder: Path) -> Iterator[str]:
     """Draw the few that move the answer most into a folder; the text that belongs to it."""
     _, answer = rule_of(study)
     first, second = (level_name(answer.factor, level) for level in answer.contrast)
     words = measure_name(answer.measure)
     unit = unit_of(answer.measure)
-    most = found.most_moving
+    most = screening.most_moving
     with style.styled():
-        _draw(found, f"{first} minus {second} in {words} [{unit}]", folder / FIGURE)
+        _draw(screening, f"{first} minus {second} in {words} [{unit}]", folder / FIGURE)
     yield (
-        f"{first} minus {second} in {words}: {found.usual:.3g} {unit} on average over "
-        f"{found.points} points within the bands of {len(found.numbers)} assumed numbers, "
-        f"{found.persons} persons each."
+        f"{first} minus {second} in {words}: {screening.usual:.3g} {unit} on average over "
+        f"{screening.points} points within the bands of {len(screening.numbers)} assumed numbers, "
+        f"{screening.persons} persons each."
     )
-    still = sum(each.size == 0.0 for _, each in found.numbers)
+    still = sum(each.size == 0.0 for _, each in screening.numbers)
     yield f"{still} of the numbers do not move it at all. Those that move it most:"
     for number, each in most:
         way = "up" if each.mean.mean > 0 else "down"
@@ -46,8 +46,8 @@ def draw_screening(study: Study, found: Screening, folder: Path) -> Iterator[str
     yield f"Figure: {folder / FIGURE}"
 
 
-def _draw(found: Screening, label: str, path: Path) -> None:
-    most = found.most_moving
+def _draw(screening: Screening, label: str, path: Path) -> None:
+    most = screening.most_moving
     figure, ((ax,),) = style.panels(1, 1, 1.1 + _ROW * max(len(most), 1))
     rows = list(range(len(most)))[::-1]
     for row, (_, each) in zip(rows, most, strict=True):

@@ -114,8 +114,8 @@ def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
 
 
 def _half_widths(shifts: Shifts, column: str) -> Any:
-    found = shifts.against(column, shifts.baseline)
-    half = 0.5 * (found.high - found.low).reshape(len(shifts.policies), -1)
+    bands = shifts.against(column, shifts.baseline)
+    half = 0.5 * (bands.high - bands.low).reshape(len(shifts.policies), -1)
     return np.nan_to_num(half)
 
 
@@ -146,13 +146,13 @@ class WayToBest(ShiftFigure):
         look = _looks(shifts)
         figure, (axes,) = panels(1, len(shifts.stops), 1.1 + 0.26 * len(names), sharey=True)
         for stop, ax in enumerate(axes):
-            found = shifts.progress(stop)
-            columns = with_limits("share", found.mean, found.low, found.high)
+            bands = shifts.progress(stop)
+            columns = with_limits("share", bands.mean, bands.low, bands.high)
             numbers.add({"at": shifts.titles[stop]}, columns | {"dispatch.policy": names})
             for row, policy in enumerate(names):
                 colour, mark = look[policy]
-                ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
-                ax.plot(100 * found.mean[row], row, marker=mark, color=colour, ms=7)
+                ax.hlines(row, 100 * bands.low[row], 100 * bands.high[row], color=colour, lw=1.6)
+                ax.plot(100 * bands.mean[row], row, marker=mark, color=colour, ms=7)
             ax.axvline(100, color=INK, lw=0.8)
             ax.axvline(0, color=SOFT, lw=0.8, ls=":")
             _policy_axis(ax, names, capital(shifts.titles[stop]))

@@ -55,8 +55,8 @@ class TradeOff(style.ReportFigure):
                 bars += _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
                 values = {
-                    with_unit(f"{word}_{edge}", column): getattr(found, name)
-                    for word, column, found in zip(
+                    with_unit(f"{word}_{edge}", column): getattr(finding, name)
+                    for word, column, finding in zip(
                         ("exposure", "response"), columns, bands, strict=True
                     )
                     for edge, name in _EDGES.items()

@@ -55,8 +55,8 @@ def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
         row: Measures of the trial.
         trace: Recorded motion of the trial.
     """
-    shown = [*trace.places, *((x, y) for x, y, _ in trace.marks)]
-    unit = LengthUnit("mm", 1000.0) if np.ptp(shown, axis=0).max() < 1.0 else LengthUnit("m", 1.0)
+    points = [*trace.places, *((x, y) for x, y, _ in trace.marks)]
+    unit = LengthUnit("mm", 1000.0) if np.ptp(points, axis=0).max() < 1.0 else LengthUnit("m", 1.0)
     with styled():
         figure, ((way, speed),) = panels(1, 2, 3.8)
         _speed(speed, trace, unit)

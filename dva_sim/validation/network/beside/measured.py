@@ -53,16 +53,16 @@ def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
         seeds.setdefault(job.config, {})[job.seed] = None
     rows = [] if results is None else results.manifest["cells"]
     as_run = {(row["part"], row["cell"]): str(row["config"]) for row in rows}
-    found = {}
+    by_config = {}
     for cell in grid:
         if isinstance(cell.scenario, MiddlewareScenario):
             config = as_run.get((cell.part, cell.cell), cell.config)
             levels = {factor: str(level) for factor, level in cell.levels.items()}
             scenario = cell.scenario if config == cell.config else None
-            found[config] = AskedCell(config, levels, scenario, tuple(seeds[cell.config]))
-    if not found:
+            by_config[config] = AskedCell(config, levels, scenario, tuple(seeds[cell.config]))
+    if not by_config:
         raise ConfigError("the study has no part whose model is middleware")
-    return list(found.values())
+    return list(by_config.values())
 
 
 @dataclass(frozen=True)
@@ -88,17 +88,17 @@ def measured_in(results: Results) -> dict[str, Measured]:
     missing = [name for name in (*ALLOWANCES, "disturbed") if runs.rows and name not in runs]
     if missing:
         raise ConfigError(f"{results.folder} has no column {missing[0]}: not a middleware study")
-    found = {}
+    values_of_cells = {}
     for config in dict.fromkeys(runs.get("config", ())):
         own = runs.where(runs["config"] == config)
         disturbed = own["disturbed"].astype(float) > 0
         quiet = own.where(~disturbed)
         values = {name: quiet[name].astype(float).tolist() for name in ALLOWANCES}
-        found[str(config)] = Measured(values, int(disturbed.sum()))
-    return found
+        values_of_cells[str(config)] = Measured(values, int(disturbed.sum()))
+    return values_of_cells
 
 
-def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Measured]:
+def measured_in_commands(path: Path, asked_cells: Sequence[AskedCell]) -> dict[str, Measured]:
     """Return the kept commands of a study, by configuration.
 
     It is not kept which runs were disturbed.
@@ -106,7 +106,7 @@ def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Me
     Args:
         path: A table of commands, by middleware, link and person: when each was made and when it
             was applied, [s] from the start of its run.
-        asked: The study's configurations.
+        asked_cells: The study's configurations.
 
     Raises:
         ConfigError: the table cannot be read.
@@ -125,7 +125,7 @@ def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Me
         cell.config: Measured(
             _measures(cell.scenario, times[cell.levels["middleware"], cell.levels["link"]].values())
         )
-        for cell in asked
+        for cell in asked_cells
         if cell.scenario is not None
     }
 
@@ -207,7 +207,7 @@ def rule_of(lines: Sequence[Evidence]) -> Evidence:
 
 
 def beside_of(
-    asked: Sequence[AskedCell],
+    asked_cells: Sequence[AskedCell],
     measured: Mapping[str, Measured] | None,
     plays: int,
     workers: int,
@@ -216,7 +216,7 @@ def beside_of(
     """Predict some configurations, as far as no bands were kept, beside what was measured.
 
     Args:
-        asked: The configurations.
+        asked_cells: The configurations.
         measured: The runs of each; None if there are none, and all are predicted now.
         plays: Number of simulated runs per seed.
         workers: Processes.
@@ -225,9 +225,11 @@ def beside_of(
     Raises:
         RunsFailed: a play failed.
     """
-    kept = read_kept() if measured is not None else {}
-    known = {cell.config: kept.get((cell.config, cell.seeds)) for cell in asked}
-    todo = [cell for cell in asked if not known[cell.config]]
+    kept_values = read_kept() if measured is not None else {}
+    kept_by_config = {
+        cell.config: kept_values.get((cell.config, cell.seeds)) for cell in asked_cells
+    }
+    todo = [cell for cell in asked_cells if not kept_by_config[cell.config]]
     of = plays_in(todo, plays)
     played = {
         prediction.config: prediction
@@ -235,12 +237,12 @@ def beside_of(
     }
     predictions = [
         played.get(cell.config)
-        or CellPrediction(cell.config, cell.levels, cell.seeds, known[cell.config] or {})
-        for cell in asked
+        or CellPrediction(cell.config, cell.levels, cell.seeds, kept_by_config[cell.config] or {})
+        for cell in asked_cells
     ]
     lines = lines_beside(predictions, measured)
     notes = []
-    if kept_here := len(asked) - len(todo):
+    if kept_here := len(asked_cells) - len(todo):
         notes = [f"The bands of {kept_here} configurations were kept before they were measured."]
     table = rows_of([prediction for prediction in predictions if prediction.config in played])
     if table:

@@ -125,33 +125,35 @@ class AskedCell:
 
 
 def predict_all(
-    asked: Sequence[AskedCell], plays: int, workers: int, progress: Progress = lambda done: None
+    cells: Sequence[AskedCell], plays: int, workers: int, progress: Progress = lambda done: None
 ) -> list[CellPrediction]:
     """Return the predictions of some configurations, in their order.
 
     Raises:
         RunsFailed: a play failed.
     """
-    played = [cell for cell in asked if not cell.why_not]
+    played = [cell for cell in cells if not cell.why_not]
     jobs = {
         (cell.config, seed): job_of(cell.config, seed, cell.scenario, plays=plays)
         for cell in played
         for seed in cell.seeds
     }
     rows = play_jobs(list(jobs.values()), perform, workers, "{} could not be played", progress, len)
-    found = []
-    for cell in asked:
+    predictions = []
+    for cell in cells:
         bands = {}
         if not cell.why_not:
             by_seed = [rows[jobs[cell.config, seed].key] for seed in cell.seeds]
             bands = _bands(cell, by_seed)
-        found.append(CellPrediction(cell.config, cell.levels, cell.seeds, bands, cell.why_not))
-    return found
+        predictions.append(
+            CellPrediction(cell.config, cell.levels, cell.seeds, bands, cell.why_not)
+        )
+    return predictions
 
 
-def plays_in(asked: Sequence[AskedCell], plays: int) -> int:
+def plays_in(cells: Sequence[AskedCell], plays: int) -> int:
     """Return the number of runs needed."""
-    return sum(plays * len(cell.seeds) for cell in asked if not cell.why_not)
+    return sum(plays * len(cell.seeds) for cell in cells if not cell.why_not)
 
 
 def perform(job: StudyJob) -> Tables:

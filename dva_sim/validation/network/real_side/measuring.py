@@ -82,15 +82,15 @@ def _timer_hz() -> int | None:
         text = gzip.decompress(Path("/proc/config.gz").read_bytes()).decode()
     with suppress(OSError):
         text = text or Path(f"/boot/config-{platform.release()}").read_text(encoding="utf-8")
-    found = re.search(r"^CONFIG_HZ=(\d+)$", text, re.MULTILINE)
-    return int(found[1]) if found else None
+    match = re.search(r"^CONFIG_HZ=(\d+)$", text, re.MULTILINE)
+    return int(match[1]) if match else None
 
 
 def _processor() -> str | None:
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-        found = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
-        return found[1] if found else None
+        match = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
+        return match[1] if match else None
     return None
 
 
@@ -187,10 +187,10 @@ class Table(AbstractContextManager["Table"]):
         """
         beside = self.path.with_suffix(".machine.json")
         if self.rows and beside.exists():
-            known = json.loads(beside.read_text(encoding="utf-8"))
-            other = [name for name in machine if known.get(name) != machine[name]]
+            signed = json.loads(beside.read_text(encoding="utf-8"))
+            other = [name for name in machine if signed.get(name) != machine[name]]
             if other:
-                text = ", ".join(f"{n} was {known.get(n)}, is {machine[n]}" for n in other)
+                text = ", ".join(f"{n} was {signed.get(n)}, is {machine[n]}" for n in other)
                 raise ConfigError(f"was measured elsewhere ({text}): begin another file", self.path)
         beside.write_text(json.dumps(machine, indent=1) + "\n", encoding="utf-8")
 
@@ -265,15 +265,15 @@ def measure_all(
         EmulatorError: the link cannot be set up, or fails again and again.
     """
     machine = describe_machine(link)
-    wanted = [(condition, seed) for seed in seeds for condition in conditions]
+    plan = [(condition, seed) for seed in seeds for condition in conditions]
     failures = list[str]()
     in_a_row = 0
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
-        known = {(row["cond_id"], row["seed"]) for row in table.rows}
-        left = [(c, s) for c, s in wanted if (c.hash, str(s)) not in known]
-        done = len(wanted) - len(left)
-        tell(Progress(done, len(wanted), _time_of(left)))
+        done_keys = {(row["cond_id"], row["seed"]) for row in table.rows}
+        left = [(c, s) for c, s in plan if (c.hash, str(s)) not in done_keys]
+        done = len(plan) - len(left)
+        tell(Progress(done, len(plan), _time_of(left)))
         for turn, (condition, seed) in enumerate(left, start=1):
             cell = f"{group}_{condition.label}_s{seed}"
             identity = dict(zip(_IDENTITY, (cell, group, str(seed), condition.hash), strict=True))
@@ -286,7 +286,7 @@ def measure_all(
                 in_a_row += 1
                 if in_a_row == _MOST_FAILURES:
                     raise
-            tell(Progress(done, len(wanted), _time_of(left[turn:])))
+            tell(Progress(done, len(plan), _time_of(left[turn:])))
     return failures
 
 
@@ -361,7 +361,7 @@ def made_with(path: Path) -> str:
 def shortened(block: BlockConfig) -> list[Condition]:
     """Return each link once, with programs by turns, measured for a short time."""
     names = list(block.programs)
-    found = []
+    conditions = []
     for turn, link in enumerate(block.links):
         programs = names[turn % len(names)]
         changes = {
@@ -369,5 +369,5 @@ def shortened(block: BlockConfig) -> list[Condition]:
             "programs": {programs: block.programs[programs]},
             "settings": {**block.settings, "dur_s": QUICK_S},
         }
-        found += conditions_of(block.model_copy(update=changes))
-    return found
+        conditions += conditions_of(block.model_copy(update=changes))
+    return conditions

@@ -140,12 +140,12 @@ def check_link(rootless: bool = False) -> list[LinkFinding]:
 
 def find_delay(crossing: Crossing) -> list[LinkFinding]:
     """Return the median and the 95th percentile of a constant delay."""
-    wanted = 1e3 * crossing.wire.delay_s
+    expected_ms = 1e3 * crossing.wire.delay_s
     p50, p95 = (1e3 * float(p) for p in np.percentile(crossing.delays, (50, 95)))
     band = 1e3 * _DELAY_BAND_S
     return [
-        LinkFinding("delay, median", "ms", wanted, p50, band),
-        LinkFinding("delay, 95th percentile", "ms", wanted, p95, band),
+        LinkFinding("delay, median", "ms", expected_ms, p50, band),
+        LinkFinding("delay, 95th percentile", "ms", expected_ms, p95, band),
     ]
 
 
@@ -154,14 +154,14 @@ def find_jitter(crossing: Crossing) -> list[LinkFinding]:
 
     From the standard deviation, which a single late packet does not move.
     """
-    wanted = 1e3 * crossing.wire.jitter_s
-    found = 1e3 * float(np.std(crossing.delays)) * np.sqrt(3)
+    expected_ms = 1e3 * crossing.wire.jitter_s
+    jitter_ms = 1e3 * float(np.std(crossing.delays)) * np.sqrt(3)
     overtaken = float(np.mean(np.diff(crossing.numbers) < 0))
     interval = float(np.mean(np.diff(crossing.sent)))
     share = 0.5 * (1 - interval / (2 * crossing.wire.jitter_s)) ** 2
     sigma = np.sqrt(share * (1 - share) / len(crossing.numbers))
     return [
-        LinkFinding("jitter, half-width", "ms", wanted, float(found), 1e3 * _DELAY_BAND_S),
+        LinkFinding("jitter, half-width", "ms", expected_ms, float(jitter_ms), 1e3 * _DELAY_BAND_S),
         LinkFinding("overtaken", "", share, overtaken, float(_SIGMAS * sigma)),
     ]
 
@@ -187,10 +187,10 @@ def find_bursts(crossing: Crossing) -> list[LinkFinding]:
 
 def find_rate(crossing: Crossing) -> list[LinkFinding]:
     """Return bits that arrive per second while packets wait."""
-    wanted = 1e-3 * crossing.wire.rate_bps
+    expected_kbps = 1e-3 * crossing.wire.rate_bps
     bits = 8 * crossing.size * (len(crossing.arrived) - 1)
-    found = 1e-3 * bits / float(crossing.arrived[-1] - crossing.arrived[0])
-    return [LinkFinding("rate", "kbit/s", wanted, found, _RATE_BAND * wanted)]
+    rate_kbps = 1e-3 * bits / float(crossing.arrived[-1] - crossing.arrived[0])
+    return [LinkFinding("rate", "kbit/s", expected_kbps, rate_kbps, _RATE_BAND * expected_kbps)]
 
 
 _fast = partial(LinkConfig, rate_bps=UNLIMITED_BPS)

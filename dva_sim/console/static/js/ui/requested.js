@@ -1,4 +1,4 @@
-/** What a person has asked for, shown until it is so or refused. */
+/** Choice of a person, shown until the simulation reports it or refuses it. */
 import { useEffect, useState } from '../../vendor/preact.js';
 
 /**
