@@ -38,7 +38,7 @@ HEARTBEAT_PERIOD = 2.0  # design: [s]
 FIRST_WORD = 2.0  # design: after it a DVA that people have named is said not to answer [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
 REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not keep [s]
-LONGEST_BID = 1e6  # design: no offer to go somewhere is longer [s]
+MAX_BID = 1e6  # design: no offer to go somewhere is longer [s]
 RENEW_PERIOD = 10.0  # design: from one registration to the next [s]
 
 Handler = Callable[[m.Message], m.Reply | None]

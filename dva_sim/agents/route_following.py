@@ -85,7 +85,7 @@ class _Place:
 
 ROUNDED = 1e-6  # design: far more than lengths are rounded by [m]
 BEND = 0.6  # design: a route leads away from a place until it has turned by so much [rad]
-AWAY = 1.0 / math.cos(BEND)  # design: way along it by which it is a metre away, at most
+METRE_ALONG_M = 1.0 / math.cos(BEND)  # design: way along it by which it is a metre away, at most
 
 
 class _Line:
@@ -153,7 +153,7 @@ class _Line:
             if far < nearest:
                 nearest = far
                 best = (i, along, away_x, away_y)
-                away = along + AWAY * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
+                away = along + METRE_ALONG_M * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
                 until = bisect_right(self._turned, self._turned[i] + BEND, i)
                 i += 1
             else:

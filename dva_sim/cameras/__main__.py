@@ -24,14 +24,14 @@ from starlette.routing import Route
 
 from dva_sim.cameras.painting import NICENESS, run
 from dva_sim.cameras.streaming import PictureStream
-from dva_sim.cameras.streams import MOST_VIEWERS, CameraStreams, headers_of
+from dva_sim.cameras.streams import MAX_VIEWERS, CameraStreams, headers_of
 from dva_sim.serving.admission import Admission, own_names
 from dva_sim.serving.pipes import PipeEnd, WatchedEnd
 from dva_sim.serving.port_guard import CLIENT, PortGuard
 from dva_sim.serving.port_listener import fitting_places
 from dva_sim.serving.server import Server, serve
 
-MOST_REQUEST = 16 * 1024  # of which a path and headers consist [B]
+MAX_REQUEST = 16 * 1024  # of which a path and headers consist [B]
 REPEATED = 1.0  # so often is said again who is watched [s]
 NOT_KEPT = {"Cache-Control": "no-store"}
 
@@ -55,7 +55,7 @@ class CameraPages:
             return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
         viewer = self._streams.admit(robot, CLIENT)
         if viewer is None:
-            raise HTTPException(503, f"{MOST_VIEWERS} viewers are looking already")
+            raise HTTPException(503, f"{MAX_VIEWERS} viewers are looking already")
         return PictureStream(self._streams.stream(viewer), partial(self._streams.leave, viewer))
 
     async def still(self, request: Request) -> Response:
@@ -120,7 +120,7 @@ async def _serve(world: int, listener: socket.socket, host: str, labels: Sequenc
     closing = asyncio.ensure_future(_close_when(ended, streams))
     # Pictures have no token: their address goes to all devices, by messages of the DVA.
     guarded = PortGuard(app, Admission(own_names(host, any_port=True)))
-    server = Server.of(guarded, MOST_REQUEST, ws="none")
+    server = Server.of(guarded, MAX_REQUEST, ws="none")
     await serve(server, listener, fitting_places(1), ended)
     for task in (saying, closing):
         task.cancel()

@@ -13,7 +13,7 @@ from typing import Any
 
 from PIL import Image
 
-from dva_sim.agents.people.bystander import DOWN
+from dva_sim.agents.people.bystander import INCAPACITATED
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.scenario import Scenario, site_of
@@ -104,7 +104,7 @@ class Eyes:
 
 def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
     """Return the figure of somebody who was near."""
-    return Figure(kind, x, y, heading, number=index, lying=activity == DOWN)
+    return Figure(kind, x, y, heading, number=index, lying=activity == INCAPACITATED)
 
 
 class Encoder:

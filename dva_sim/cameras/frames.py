@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 MAGIC = b'{"robot":'  # how each header begins
 JPEG_END = b"\xff\xd9"
-MOST_HEADER = 512  # bytes
-MOST_PICTURE = 1 << 20  # bytes
+MAX_HEADER = 512  # bytes
+MAX_PICTURE = 1 << 20  # bytes
 ALIVE = -1  # robot number of a keep-alive record
 
 
@@ -74,7 +74,7 @@ class Unpacker:
         No picture if bytes are to be skipped; None to wait.
         """
         size = int.from_bytes(self._rest[:4], "big")
-        if size > MOST_HEADER or self._rest[4 : 4 + len(MAGIC)] != MAGIC:
+        if size > MAX_HEADER or self._rest[4 : 4 + len(MAGIC)] != MAGIC:
             return None, self._skip()
         if len(self._rest) < 4 + size:
             return None
@@ -85,7 +85,7 @@ class Unpacker:
         except (ValueError, KeyError, TypeError):
             return None, self._skip()
         end = 4 + size + length
-        if not 0 <= length <= MOST_PICTURE:
+        if not 0 <= length <= MAX_PICTURE:
             return None, self._skip()
         if self._rest.find(MAGIC, 4 + size, end) >= 0:
             return None, self._skip()

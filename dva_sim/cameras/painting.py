@@ -20,7 +20,7 @@ NICENESS = 3  # the run goes first
 ALIVE_S = 1.0  # heartbeat period [s]
 IDLE_S = 0.25  # polling period [s]
 RATE_ROOM = 1.25  # of real time: pictures of a robot in a second, of its frames in one of the run
-LEAST_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
+MIN_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
 
 Line = dict[str, Any]
 
@@ -80,7 +80,7 @@ class Painter:
         robot = min(ready, key=lambda robot: self._due.get(robot, 0.0))
         frame = self._frames.pop(robot)
         rate = 0.0 if self._eyes is None else self._eyes.rate
-        self._due[robot] = now + 1.0 / max(LEAST_RATE, RATE_ROOM * rate)
+        self._due[robot] = now + 1.0 / max(MIN_RATE, RATE_ROOM * rate)
         self.drawn += 1
         jpeg = self._jpeg(frame)
         captured = round(frame["captured_ms"])

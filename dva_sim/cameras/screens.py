@@ -20,9 +20,9 @@ from dva_sim.network.messaging import Subscription, Transport
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.scenario import Scenario
 
-MOST_UNDER_WAY = 400  # frames of a robot
-BEYOND = 2.0  # how much farther than the camera's range people are drawn
-LEAST_SEEN = 25.0  # people are drawn so far away in any case [m]
+MAX_UNDER_WAY = 400  # frames of a robot
+PEOPLE_RANGE_FACTOR = 2.0  # how much farther than the camera's range people are drawn
+MIN_SEEN = 25.0  # people are drawn so far away in any case [m]
 
 
 class FilmedRun(Protocol):
@@ -70,7 +70,7 @@ class Screens:
         self._subscribed: dict[str, Subscription] = {}
         self._watched: set[str] = set()
         self._held: set[str] = set()
-        self._reach = max(LEAST_SEEN, BEYOND * run.scenario.camera.range_m)
+        self._reach = max(MIN_SEEN, PEOPLE_RANGE_FACTOR * run.scenario.camera.range_m)
         for robot in run.field.robots.values():
             robot.filmed = self._film
 
@@ -134,7 +134,7 @@ class Screens:
             return
         taken = self._taken.setdefault(robot, OrderedDict())
         taken[frame.observation.tick] = number, self._figures(robot, frame)
-        if len(taken) > MOST_UNDER_WAY:
+        if len(taken) > MAX_UNDER_WAY:
             taken.popitem(last=False)
 
     def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:

@@ -19,8 +19,8 @@ LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
 SILENCE = 3.0  # of who draws, after which there is no picture [s]
 STARTING = 60.0  # before the first word, which comes when the site is built [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
-FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
-MOST_VIEWERS = 64
+FRESH_FOR_S = 1.0  # a single picture that came so long ago is not waited for [s]
+MAX_VIEWERS = 64
 
 
 @dataclass(eq=False)
@@ -114,7 +114,7 @@ class CameraStreams:
 
         One of a lower rank has to leave for one of a higher rank.
         """
-        if len(self._viewers) >= MOST_VIEWERS:
+        if len(self._viewers) >= MAX_VIEWERS:
             least = min(self._viewers, key=lambda viewer: viewer.rank)
             if least.rank >= rank:
                 return None
@@ -159,7 +159,7 @@ class CameraStreams:
         """Return the newest picture; None if there is none for too long."""
         try:
             newest = self._newest.get(viewer.robot)
-            if newest is not None and time.monotonic() - newest[1] < FRESH:
+            if newest is not None and time.monotonic() - newest[1] < FRESH_FOR_S:
                 return newest[0]
             async with asyncio.timeout(ONE_WITHIN if self.draws else 0.0):
                 return await self._after(viewer, newest[0] if newest else None)

@@ -12,7 +12,7 @@ import typer
 from dva_sim.cli.options import Quiet
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.forms import (
-    MOST_PORT,
+    MAX_PORT,
     SCENARIOS,
     Changes,
     OptionForm,
@@ -37,7 +37,7 @@ def link(
             "Make a port of the near end available on 127.0.0.1 of this computer.",
             metavar="PORT",
             least=1,
-            most=MOST_PORT,
+            most=MAX_PORT,
             is_repeated=True,
         ),
     ] = (),

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 STORY_LINES = 12
 ALWAYS_SHOWN = "refused", "not sent", "form", "not recorded"  # in the names of counters
-HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
+ORDERING_WAIT_S = (
+    2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
+)
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
 WIDTH = 80  # where there is no terminal to ask [characters]
 COLUMNS = (
@@ -210,7 +212,7 @@ def run_one(part: str, options: LiveOptions) -> None:
         options = replace(options, dva=_default_dvas(options))
     check(options)
     if part in PARTS and part != "dva":
-        _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
+        _print(console, f"Looking for the DVA at {options.dva} for {process.DVA_WAIT_S:g} s ...")
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:
@@ -250,7 +252,7 @@ class InOrder:
         """Take a report, and print what nothing earlier can come to any more."""
         _say_where(self._console, self._board, report)
         self._waiting = sorted(self._waiting + self._board.hear(report))
-        while self._waiting and self._waiting[0][0] <= self._board.time - HELD:
+        while self._waiting and self._waiting[0][0] <= self._board.time - ORDERING_WAIT_S:
             _print(self._console, story_line(self._waiting.pop(0)))
 
     def close(self) -> None:

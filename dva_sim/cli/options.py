@@ -19,7 +19,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 from typer import Argument, Option
 
-from dva_sim.options.forms import MOST_SEED, OptionForm, forms_of, split
+from dva_sim.options.forms import MAX_SEED, OptionForm, forms_of, split
 
 Json = Annotated[bool, OptionForm("Print JSON, for other programs.", names=("--json",))]
 Quiet = Annotated[bool, OptionForm("Print only errors.", names=("-q", "--quiet"))]
@@ -117,7 +117,7 @@ def _whole(least: int, most: int) -> Callable[[int | str], int]:
         written = str(text)
         if re.fullmatch(r"[+-]?[0-9]{1,19}", written) and least <= int(written) <= most:
             return int(written)
-        within = f"of at least {least}" if most == MOST_SEED else f"from {least} to {most}"
+        within = f"of at least {least}" if most == MAX_SEED else f"from {least} to {most}"
         raise typer.BadParameter(f"{written!r} should be a whole number {within}")
 
     return read

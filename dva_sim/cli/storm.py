@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from dva_sim.storms.outcome import StormOutcome
     from dva_sim.storms.plan import StormPlan
 
-OUT = Path("results/storms")
-AROUND = 20.0  # of a breach, in its story [s]
+STORMS_FOLDER = Path("results/storms")
+STORY_MARGIN_S = 20.0  # of a breach, in its story [s]
 _PLAN = "Saved plan of one storm, such as a failure, to replay alone."
 _HOURS = "Continue with further seeds until this many fleet-hours are reached in total."
 
@@ -37,7 +37,7 @@ def storm(
         str, OptionForm("Storms of one `team`, or of several DVAs (`regions`).", metavar="PLAY")
     ] = "team",
     jobs: Jobs = None,
-    out: Annotated[Path, out_form("Folder for the journal and for failures.")] = OUT,
+    out: Annotated[Path, out_form("Folder for the journal and for failures.")] = STORMS_FOLDER,
     quiet: Quiet = False,
 ) -> None:
     """Simulate hours of faults and check the safety rules.
@@ -159,7 +159,7 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
     story = [
         f"{moment.time:9.3f} s  {moment.who}: {moment.what}\n"
         for moment in runs[0].recorder.timeline
-        if abs(moment.time - when) < AROUND or moment.kind == "fault"
+        if abs(moment.time - when) < STORY_MARGIN_S or moment.kind == "fault"
     ]
     file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
     file.write_text(small.text(), encoding="utf-8")

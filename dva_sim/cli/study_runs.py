@@ -33,8 +33,8 @@ from dva_sim.kernel.errors import ExitCode, error_line
 from dva_sim.kernel.wording import capital
 from dva_sim.options.studies import RunOptions, TuneOptions
 
-_FEW = 5  # failures that are told one by one
-_MANY = 500  # configurations, which take some seconds to check
+_LISTED_FAILURES = 5  # failures that are told one by one
+_SLOW_TO_CHECK = 500  # configurations, which take some seconds to check
 _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S = 60
@@ -164,7 +164,7 @@ class _Shown(StudyListener):
     @override
     def ran(self, results: Results) -> None:
         failures = results.failures
-        for f in failures if is_verbose() else failures[:_FEW]:
+        for f in failures if is_verbose() else failures[:_LISTED_FAILURES]:
             where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
             say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
         if failures:
@@ -174,7 +174,7 @@ class _Shown(StudyListener):
 
     @override
     def recorded(self, problems: list[str]) -> None:
-        for problem in problems if is_verbose() else problems[:_FEW]:
+        for problem in problems if is_verbose() else problems[:_LISTED_FAILURES]:
             say(f"[red]not recorded:[/red] {escape(problem)}")
         if problems:
             failed = _counted(len(problems), "run")
@@ -186,7 +186,7 @@ class _Shown(StudyListener):
         if step == "reporting":
             with console.status("Writing the report ..."):
                 yield lambda *_: None
-        elif step == "checking" and total < _MANY:
+        elif step == "checking" and total < _SLOW_TO_CHECK:
             yield lambda *_: None
         else:
             if step == "checking":

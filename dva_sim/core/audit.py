@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from dva_sim.protocol.facts import Fact
 
-MOST_KEPT = 10_000  # facts that nobody has taken yet; older ones are lost, and counted
+MAX_KEPT = 10_000  # facts that nobody has taken yet; older ones are lost, and counted
 
 
 @dataclass
@@ -21,11 +21,11 @@ class AuditTrail:
 
     keeps: bool = True
     lost: int = 0
-    _facts: deque[Fact] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
+    _facts: deque[Fact] = field(default_factory=lambda: deque(maxlen=MAX_KEPT))
 
     def note(self, fact: Fact) -> None:
         """Note a decision."""
-        self.lost += len(self._facts) == MOST_KEPT
+        self.lost += len(self._facts) == MAX_KEPT
         self._facts.append(fact)
 
     def take(self) -> list[Fact]:

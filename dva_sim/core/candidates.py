@@ -15,7 +15,7 @@ from dva_sim.protocol.control_room import FREE
 from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
-MOST_NAMED = 32
+MAX_NAMED = 32
 NO_WAY = "there is no way"
 CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
 
@@ -133,7 +133,7 @@ def _why_not_a_robot(dispatcher: Dispatcher, robot: str, event: Event, now: floa
 def _as_many_as_fit(everybody: list[m.Candidate]) -> tuple[m.Candidate, ...]:
     named: list[m.Candidate] = []
     room = LIST_BYTES
-    for who in everybody[:MOST_NAMED]:
+    for who in everybody[:MAX_NAMED]:
         room -= CANDIDATE_BYTES + xml_size(who.label) + xml_size(who.reason)
         if room < 0:
             break

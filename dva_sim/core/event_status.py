@@ -9,7 +9,7 @@ from dva_sim.core.questions import Question, Questions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
-MOST_LISTED = 16
+MAX_LISTED = 16
 EVENT_BYTES = 950  # of one event without what people have written, at most [B]
 _BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
 
@@ -60,7 +60,7 @@ def event_list(events: Iterable[Event], questions: Questions, now: float) -> m.E
     for event in events:
         status = status_of(event, questions.of(event.number), now)
         room -= EVENT_BYTES + _written(status)
-        if listed and (room < 0 or len(listed) == MOST_LISTED):
+        if listed and (room < 0 or len(listed) == MAX_LISTED):
             break
         listed.append(status)
     return m.EventList(tuple(listed))

@@ -36,9 +36,9 @@ FINAL = frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED, S.EXPIRED})  # and CONFI
 LOOKING = (S.ASSIGNED, S.ON_SCENE)
 """States with an active order to look."""
 
-MOST_OPEN = 10_000  # events at the same time; a report of one more is refused
+MAX_OPEN = 10_000  # events at the same time; a report of one more is refused
 KEPT_CLOSED = 1000  # a late word on one of the last is still understood
-MOST_SOURCES = 64  # whose reports of one event are told apart
+MAX_SOURCES = 64  # whose reports of one event are told apart
 DEGREE = 111_000.0  # of latitude [m]
 SAME_SPOT = 0.001  # where reports are not merged, what is taken back was reported just here [m]
 
@@ -374,7 +374,7 @@ class EventTable:
     @property
     def full(self) -> bool:
         """True if no further event fits."""
-        return len(self.open) >= MOST_OPEN
+        return len(self.open) >= MAX_OPEN
 
     def near(self, kind: str, position: Position) -> Event | None:
         """Return the open event that a report is about, if it is known."""
@@ -401,7 +401,7 @@ class EventTable:
 
     def note_source(self, event: Event, source: str, confidence: float) -> None:
         """Note which device has reported an event; said twice it is not more certain."""
-        if source in event.sources or len(event.sources) < MOST_SOURCES:
+        if source in event.sources or len(event.sources) < MAX_SOURCES:
             event.sources[source] = max(confidence, event.sources.get(source, 0.0))
 
     def take_back(self, event: Event, source: str) -> None:

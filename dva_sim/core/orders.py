@@ -28,7 +28,7 @@ from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.facts import Fact
 
-OVER = "done"  # said by the DVA to who has an order: it is over, stop
+ORDER_DONE = "done"  # said by the DVA to who has an order: it is over, stop
 
 
 @dataclass
@@ -372,7 +372,7 @@ class Orders:
         return begun + self.rules.order_limit
 
     def _take_back(self, device: str, event: Event, now: float) -> list[Send]:
-        over = m.OrderProgress(event.number, OVER)
+        over = m.OrderProgress(event.number, ORDER_DONE)
         if event.open and device == event.actor:
             return [Send(device, over), *self._act_ends(event, device, True, now)]
         if event.state not in LOOKING:
@@ -406,7 +406,7 @@ class Orders:
         An event whose actor is replaced at once stays open, however long it has waited.
         """
         if device == event.actor:
-            over = Send(device, m.OrderProgress(event.number, OVER))
+            over = Send(device, m.OrderProgress(event.number, ORDER_DONE))
             if event.act_taken_up:
                 event.act_taken_up = False
                 event.waiting_since = now
@@ -458,7 +458,7 @@ class Orders:
         """Recall the devices that look at an event, or are still finishing that."""
         holder = event.holder
         self._release(event)
-        return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
+        return [Send(holder, m.OrderProgress(event.number, ORDER_DONE))] if holder else []
 
     def decided(self, event: Event, fact: Fact) -> None:
         """Note a decision on an event, by whomever."""
@@ -555,7 +555,7 @@ class Orders:
             return []
         self._free(event, actor)
         event.actor = None
-        return [Send(actor, m.OrderProgress(event.number, OVER))]
+        return [Send(actor, m.OrderProgress(event.number, ORDER_DONE))]
 
 
 _ORDERS = (m.Order, m.TaskAward)

@@ -27,7 +27,7 @@ SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})
 LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # for devices, in this order
 DEVICE_BYTES = 175  # of one listed device without its label, at most [B]
-MOST_LISTED = 64
+MAX_LISTED = 64
 MAX_DEVICES = 20_000
 DAY = 86_400.0  # [s]
 
@@ -262,7 +262,7 @@ class Registry:
 
     def _as_many_as_fit(self) -> Iterator[Device]:
         room = LIST_BYTES
-        for entry in islice(chain.from_iterable(map(self.of_type, LISTED)), MOST_LISTED):
+        for entry in islice(chain.from_iterable(map(self.of_type, LISTED)), MAX_LISTED):
             room -= DEVICE_BYTES + xml_size(entry.device.label)
             if room < 0:
                 return
@@ -291,7 +291,7 @@ class Registry:
 
 RATE: Final = 500.0  # design: on average; 5000 devices renew as often [1/s]
 BURST: Final = 2000  # design: at once, so that a whole fleet comes back in seconds
-MOST_PEERS: Final = 10_000  # of which that is remembered
+MAX_PEERS: Final = 10_000  # of which that is remembered
 
 
 class RegistrationAllowance(NamedTuple):
@@ -312,6 +312,6 @@ class RegistrationLimit:
         before = self._left.pop(peer, RegistrationAllowance(BURST, now))
         number = min(BURST, before.number + (now - before.time) * RATE)
         self._left[peer] = RegistrationAllowance(max(number - 1.0, 0.0), now)
-        if len(self._left) > MOST_PEERS:
+        if len(self._left) > MAX_PEERS:
             self._left.popitem(last=False)
         return number >= 1.0

@@ -18,15 +18,15 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
-MOST_LOGGED: Final = 256  # requests that are kept
-MOST_LISTED: Final = 32  # of one answer
+MAX_LOGGED: Final = 256  # requests that are kept
+MAX_LISTED: Final = 32  # of one answer
 KEPT_FOR: Final = 60.0  # after the last question for them, as a `DevSub` [s]
 SHOWN_BYTES: Final = 4096  # of a request [B]
 ENTRY_BYTES: Final = 280  # of one request without its bytes and the text of its answer, at most [B]
 _NAMES: Final = "|".join(
     sorted(name for name in limits.names() if limits.types_of(name) & {"Session", "SessionID"})
 )
-MOST_DIGITS: Final = 20  # of a session
+MAX_DIGITS: Final = 20  # of a session
 _DIGIT: Final = re.compile(rb"\d")
 _SESSION: Final = re.compile(rf"(<(?:{_NAMES})\s*>)([^<]*)".encode())
 
@@ -62,7 +62,7 @@ class KeptRequests:
 
     newest: int = 0
     _wanted_until: float = -1.0
-    _kept: deque[KeptRequest] = field(default_factory=lambda: deque(maxlen=MOST_LOGGED))
+    _kept: deque[KeptRequest] = field(default_factory=lambda: deque(maxlen=MAX_LOGGED))
 
     def count(self) -> int:
         """Return the number of a request that has just arrived."""
@@ -83,7 +83,7 @@ class KeptRequests:
         listed = list[m.LoggedRequest]()
         room = LIST_BYTES
         newer = (request for request in self._kept if request.number > number)
-        for request in islice(newer, MOST_LISTED):
+        for request in islice(newer, MAX_LISTED):
             entry = _entry(request, now)
             room -= ENTRY_BYTES + len(entry.request) + xml_size(entry.text or "")
             if listed and room < 0:
@@ -112,6 +112,6 @@ def without_sessions(data: bytes) -> bytes:
 
 
 def _public_half(session: bytes) -> bytes:
-    if session.isdigit() and len(session) <= MOST_DIGITS:
+    if session.isdigit() and len(session) <= MAX_DIGITS:
         return str(int(session) >> LOW_BITS << LOW_BITS).encode()
     return _DIGIT.sub(b"0", session)  # as wrong as it was

@@ -19,10 +19,10 @@ from dva_sim.protocol.devices import ROBOT
 from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
-IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
+VALUES_IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
 
 LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
-MOST_LISTED = 64
+MAX_LISTED = 64
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Sensing:
         room = LIST_BYTES
         for one in (one for one in robots if one in self.known):
             line, taken = _line(one, self.known[one], room)
-            if line is None or len(lines) == MOST_LISTED:
+            if line is None or len(lines) == MAX_LISTED:
                 break
             lines.append(line)
             room -= taken
@@ -148,16 +148,16 @@ class Sensing:
             self._above.pop(key, None)
             self._times.pop(key, None)
             return None
-        self._times.setdefault(key, deque(maxlen=IN_A_ROW)).append(
+        self._times.setdefault(key, deque(maxlen=VALUES_IN_A_ROW)).append(
             max(value.values) / alarm.threshold
         )
         self._above[key] = self._above.get(key, 0) + 1
-        return alarm if self._above[key] == IN_A_ROW else None
+        return alarm if self._above[key] == VALUES_IN_A_ROW else None
 
     def times_alarm(self, robot: str, sensor: str) -> float:
         """Return how many times its alarm level a sensor has shown lately; 0 where it is below."""
         times = self._times.get((robot, sensor), ())
-        return min(times) if len(times) == IN_A_ROW else 0.0
+        return min(times) if len(times) == VALUES_IN_A_ROW else 0.0
 
     def _heeded(self, robot: str) -> tuple[str, ...]:
         return tuple(s.name for s in self.known[robot].sensors if s.name in self.alarms)

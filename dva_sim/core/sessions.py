@@ -39,7 +39,7 @@ class DvaAnswer:
     sends: Sequence[Send] = ()
 
 
-MOST_UNACKNOWLEDGED = 1000
+MAX_UNACKNOWLEDGED = 1000
 
 
 @dataclass
@@ -215,7 +215,7 @@ class Sessions:
         self.changes += 1
         self.unacknowledged[body.session] = Send(body.device, body)
         self._over.append(self.unacknowledged[body.session])
-        if len(self.unacknowledged) > MOST_UNACKNOWLEDGED:
+        if len(self.unacknowledged) > MAX_UNACKNOWLEDGED:
             del self.unacknowledged[next(iter(self.unacknowledged))]
 
     def to_tell(self) -> list[Send]:
@@ -233,7 +233,7 @@ class Sessions:
 
 K = TypeVar("K")
 
-MOST_OBSERVERS = 10_000
+MAX_OBSERVERS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +295,7 @@ class Permissions:
         held = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
         if held is not None and held.holder not in (holder, self.own):
             return None, False
-        if only_sensors and held is None and len(self.observers) >= MOST_OBSERVERS:
+        if only_sensors and held is None and len(self.observers) >= MAX_OBSERVERS:
             return None, False
         terms = holder, level, sensors
         same = held is not None and (held.holder, held.level, held.sensors) == terms

@@ -13,9 +13,11 @@ from dva_sim.core.orders import Orders
 from dva_sim.protocol.event_kinds import severity_word
 from dva_sim.protocol.facts import Fact
 
-MANY = 3  # devices that report one event: it is seen from several places; assumed
-OF_MANY = 0.5  # least severity of such an event; assumed
-AT_ALARM = 0.25  # severity of a value at its alarm level, twice as much at twice that; assumed
+SEVERAL_REPORTERS = 3  # devices that report one event: it is seen from several places; assumed
+SEVERAL_SEVERITY = 0.5  # least severity of such an event; assumed
+ALARM_SEVERITY = (
+    0.25  # severity of a value at its alarm level, twice as much at twice that; assumed
+)
 
 
 @dataclass
@@ -32,8 +34,8 @@ class Grading:
         """Follow another report of a known event."""
         label = self.orders.label_of(source)
         self._raise(event, severity, f"{label} reports it as graver", now)
-        if len(event.sources) >= MANY:
-            self._raise(event, OF_MANY, f"{len(event.sources)} devices report it", now)
+        if len(event.sources) >= SEVERAL_REPORTERS:
+            self._raise(event, SEVERAL_SEVERITY, f"{len(event.sources)} devices report it", now)
 
     def sensed(
         self, event: Event, sensor: str, robot: str, *, times_alarm: float, now: float
@@ -41,7 +43,7 @@ class Grading:
         """Follow a robot's sensor that has been above its alarm level for a while."""
         label = self.orders.label_of(robot)
         reason = f"{sensor} at {label} is {times_alarm:.1f} times the alarm level"
-        self._raise(event, min(1.0, AT_ALARM * times_alarm), reason, now)
+        self._raise(event, min(1.0, ALARM_SEVERITY * times_alarm), reason, now)
 
     def found(self, event: Event, severity: float, device: str, now: float) -> None:
         """Follow a finding that confirms an event."""

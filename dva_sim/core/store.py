@@ -37,7 +37,7 @@ OLDER = 1, 2  # times by the wall clock; without emergencies
 MICROSECONDS = 1e6
 OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
 KEEPS_TIME = 1.0  # how often it is written how late it is while events are open [s]
-SOON = 0.1  # the core looks once a second: what is nearly due is written now [s]
+WRITE_AHEAD_S = 0.1  # the core looks once a second: what is nearly due is written now [s]
 IDLE = 10  # and so much more rarely while none is
 WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
 _TABLES = f"""
@@ -51,7 +51,7 @@ CREATE TABLE IF NOT EXISTS stops (robot TEXT PRIMARY KEY, data TEXT NOT NULL);
 INSERT OR REPLACE INTO about VALUES ('format', {FORMAT});
 COMMIT;
 """
-_ALONE = "BEGIN IMMEDIATE; COMMIT;"  # fails while somebody else writes to the file
+_TRY_LOCK = "BEGIN IMMEDIATE; COMMIT;"  # fails while somebody else writes to the file
 _PLAIN: tuple[str, ...] = (
     *("number", "kind", "severity", "needs_containment", "reports", "sources"),
     *("responder", "operator", "actor", "taken_up", "act_taken_up", "attempts", "preemptions"),
@@ -118,7 +118,7 @@ class Store:
         try:
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
-            self._file.executescript(_ALONE if version == FORMAT else _TABLES)
+            self._file.executescript(_TRY_LOCK if version == FORMAT else _TABLES)
             self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
         except sqlite3.Error as error:
             raise self._useless(error) from None
@@ -197,7 +197,7 @@ class Store:
 
     def _time_is_due(self, dva: Dva, now: float) -> bool:
         due = self._time_kept_at + self.keeps_time * (1 if dva.events.open else IDLE)
-        return now >= due - SOON
+        return now >= due - WRITE_AHEAD_S
 
     def _write(
         self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str], now: float

@@ -48,8 +48,8 @@ TASK_COLUMNS: Final = (
 )
 UNIT_COLUMNS: Final = ("free", "robot", "engaged")  # may be sent; is a robot; is under way
 MINUTE: Final = 60.0
-NEVER: Final = -1.0  # stands for a way or time that has no end
-MOST: Final = 1e7  # bound of all observations
+NO_END: Final = -1.0  # stands for a way or time that has no end
+BOUND: Final = 1e7  # bound of all observations
 
 
 class DispatchEnv(gymnasium.Env[Observations, int]):
@@ -312,7 +312,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if self._stations:
             shapes["cover_s"] = shapes["bound_for"] = (self._units, self._stations)
         boxes: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(NEVER, MOST, shape, np.float32) for name, shape in shapes.items()
+            name: spaces.Box(NO_END, BOUND, shape, np.float32) for name, shape in shapes.items()
         }
         return spaces.Dict({**boxes, "action_mask": spaces.MultiBinary(size)})
 
@@ -348,13 +348,13 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         seen["operators"][0] = self._operators
         rows = slice(len(tasks))
         for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):
-            seen[name][:] = NEVER
+            seen[name][:] = NO_END
             seen[name][rows, self._places] = _bounded(ways[rows])
         if self._auctions:
-            seen["bids_s"][:] = NEVER
+            seen["bids_s"][:] = NO_END
             seen["bids_s"][rows, self._places] = _bounded(situation.bids[rows])
         if self._stations and situation.cover is not None:
-            seen["cover_s"][:] = NEVER
+            seen["cover_s"][:] = NO_END
             seen["cover_s"][self._places] = _bounded(situation.cover.eta)
             for place, bound in zip(self._places, situation.cover.bound_for, strict=True):
                 if bound is not None:
@@ -378,7 +378,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
 def _bounded(ways: NDArray[np.float64]) -> NDArray[np.float32]:
     """Replace infinity and nan by finite values."""
-    return np.where(np.isfinite(ways), np.minimum(ways, MOST), NEVER).astype(np.float32)
+    return np.where(np.isfinite(ways), np.minimum(ways, BOUND), NO_END).astype(np.float32)
 
 
 def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> Info:

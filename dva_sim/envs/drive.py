@@ -35,9 +35,9 @@ COLUMNS: Final = (
     "asked_speed",  # what the last action asked for, as shares of the limits
     "asked_turn",
 )
-NEAR = 0.8  # [m]
-FAR = 2.5  # [m]
-MOST: Final = 1e4  # bound of all observations
+NEAR_M = 0.8  # [m]
+FAR_M = 2.5  # [m]
+BOUND: Final = 1e4  # bound of all observations
 ROUNDING: Final = 1e-6  # of a share at its limit, as of float32
 
 
@@ -76,7 +76,7 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         low = np.array([0, -1], np.float32)
         high = np.array([1, 1], np.float32)
         self.action_space = cast("spaces.Space[Vector]", spaces.Box(low, high))
-        box = spaces.Box(-MOST, MOST, (len(COLUMNS),), np.float32)
+        box = spaces.Box(-BOUND, BOUND, (len(COLUMNS),), np.float32)
         self.observation_space = cast("spaces.Space[Vector]", box)
         self.drive: SteppedDrive | None = None
 
@@ -120,13 +120,13 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         assert drive is not None
         if (frame := drive.frame) is not None:
             seen = frame.observation
-            near = self._route.ahead(seen.x, seen.y, seen.heading, NEAR)
-            far = self._route.ahead(seen.x, seen.y, seen.heading, FAR)
+            near = self._route.ahead(seen.x, seen.y, seen.heading, NEAR_M)
+            far = self._route.ahead(seen.x, seen.y, seen.heading, FAR_M)
             self._left = far.remaining
             age = drive.now - frame.captured
             pose = (far.remaining, near.offset, near.bearing, far.bearing)
             self._shown = (*pose, seen.speed, seen.turn_rate, age)
-        return np.clip(np.array([*self._shown, *self._asked], np.float32), -MOST, MOST)
+        return np.clip(np.array([*self._shown, *self._asked], np.float32), -BOUND, BOUND)
 
 
 def _shares(action: object) -> tuple[float, float]:

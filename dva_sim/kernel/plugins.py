@@ -26,7 +26,7 @@ A = TypeVar("A")
 
 FAILURES: Final = (Exception, SystemExit)  # what is wrong with a plug-in: it may not end us either
 
-BEYOND: Final = 0.02  # share of a limit by which an answer may miss it
+LIMIT_TOLERANCE: Final = 0.02  # share of a limit by which an answer may miss it
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,7 @@ class Guard:
 
     def _held(self, what: str, value: float, least: float, most: float) -> float:
         """Clamp a value to its limits; count by how much it exceeds them beyond rounding."""
-        if not least - BEYOND * most <= value <= most + BEYOND * most:
+        if not least - LIMIT_TOLERANCE * most <= value <= most + LIMIT_TOLERANCE * most:
             self._count(f"{what} {value:.3g}; allowed is {least:.3g} to {most:.3g}")
         return min(max(value, least), most)
 

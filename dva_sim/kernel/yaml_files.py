@@ -85,7 +85,7 @@ def _place(mark: Any) -> Place:
 
 KeyPath = tuple[str | int, ...]
 SUFFIXES = (".yaml", ".yml")
-MOST_VALUES = 20_000  # in one file
+MAX_VALUES = 20_000  # in one file
 
 
 @dataclass(frozen=True)
@@ -236,8 +236,8 @@ class _TooMuchError(ValueError):
 
 def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> Any:
     """Return the plain data without ruamel's types; records the place of every key on the way."""
-    if len(places) > MOST_VALUES:
-        raise _TooMuchError(f"has more than {MOST_VALUES} values, aliases counted")
+    if len(places) > MAX_VALUES:
+        raise _TooMuchError(f"has more than {MAX_VALUES} values, aliases counted")
     if isinstance(node, CommentedMap):
         out = {}
         for key, value in node.items():

@@ -35,9 +35,9 @@ from dva_sim.simulation.scenario import Scenario
 
 LAYOUT: Final = Path(channels.__file__).with_name("foxglove_layout.json")  # panels of a run
 PROGRAMS: Final = "https://app.foxglove.dev", "file://"  # Foxglove in a browser, and its program
-MOST_REQUEST: Final = 100_000  # design: of a viewer [B]
-MOST_CONNECTIONS = 64
-MOST_VIEWERS = 16
+MAX_REQUEST: Final = 100_000  # design: of a viewer [B]
+MAX_CONNECTIONS = 64
+MAX_VIEWERS = 16
 PING: Final = 2.0  # design: between two pings [s]
 PONG_WITHIN: Final = 3.0  # design: then a viewer is cut [s]
 ENDS_WITHIN: Final = 5.0  # design: [s]
@@ -94,14 +94,14 @@ class FoxgloveServer:
         app = Starlette(routes=[WebSocketRoute("/", self._view)])
         server = Server.of(
             PortGuard(app, self._port.admission(PROGRAMS)),
-            MOST_REQUEST,
+            MAX_REQUEST,
             ws=WireProtocol,
-            ws_max_size=MOST_REQUEST,
+            ws_max_size=MAX_REQUEST,
             ws_ping_interval=PING,
             ws_ping_timeout=PONG_WITHIN,
             ws_per_message_deflate=False,
         )
-        places = PortConnections(MOST_CONNECTIONS, MOST_VIEWERS)
+        places = PortConnections(MAX_CONNECTIONS, MAX_VIEWERS)
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
             runner.run(serve(server, self._port.listener, places, self._ended))
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 from dva_sim.recordings.writing import schema_of_channel
 
 PROTOCOLS: Final = "foxglove.sdk.v1", "foxglove.websocket.v1"  # they differ in nothing used here
-MOST_WAITING: Final = 8_000_000  # design: of a viewer; then its oldest messages are dropped [B]
+MAX_WAITING: Final = 8_000_000  # design: of a viewer; then its oldest messages are dropped [B]
 MESSAGE = 1  # kind of binary messages
 TIME = 2  # kind of binary messages
 SERVER_INFO: Final = {"op": "serverInfo", "name": "dva-sim", "capabilities": ["time"]}
@@ -87,7 +87,7 @@ class FoxgloveViewer:
     def _put(self, data: bytes) -> None:
         self._data.append(data)
         self._waiting += len(data)
-        while self._waiting > MOST_WAITING:
+        while self._waiting > MAX_WAITING:
             self._waiting -= len(self._data.popleft())
         self._news.set()
 

@@ -19,16 +19,16 @@ from typing import Any, Final
 from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
 from dva_sim.kernel.recorder import Moment, Sent
 from dva_sim.simulation.full.observation_json import of_plain
-from dva_sim.simulation.full.observations import MOST_SENT, Arrived, FactGap, SafetyTerms, Senders
+from dva_sim.simulation.full.observations import MAX_SENT, Arrived, FactGap, SafetyTerms, Senders
 from dva_sim.simulation.full.verdicts import Judge, Verdict
 
 WAITS = 10.0  # for the lines of a part that is silent or behind [s]
 # First words of the lines that count.
-HERE = "here"
+OWN_SIDE = "here"
 SEEN = "seen"
 SENT_LINE = "sent"
 FRAME = "frame"
-JUDGED: Final = HERE, SEEN, SENT_LINE, FRAME
+JUDGED: Final = OWN_SIDE, SEEN, SENT_LINE, FRAME
 _STARTS: Final = tuple(f'["{word}"'.encode() for word in JUDGED)
 
 Line = list[Any]
@@ -41,13 +41,13 @@ class Facts:
         most: So many messages are remembered; None: all.
     """
 
-    def __init__(self, most: int | None = MOST_SENT) -> None:
+    def __init__(self, most: int | None = MAX_SENT) -> None:
         self._here: set[str] = set()
         self._senders = Senders(self._here.__contains__, most)
 
     def note(self, line: Line) -> None:
         """Remember the devices of this run and the messages they have sent, in any order."""
-        if line[0] == HERE:
+        if line[0] == OWN_SIDE:
             self._here.update(line[2])
         elif line[0] == SENT_LINE and line[2] in self._here:
             self._senders.note(line[2], line[4].encode())

@@ -28,8 +28,8 @@ from dva_sim.serving.processes import Child, end_all
 SCENARIO: Final = "drive-to-event"  # whose site the DVA that is started knows
 SETTLE: Final = 3.0  # design: for all to join, and more for many [s]
 JOINS_PER_S: Final = 50.0  # design: devices that join in a second
-MOST_LATE_S: Final = 1.0  # design: the 99th percentile of the DVA's replies that counts as late
-MOST_LOST: Final = 0.01  # design: share of requests lost or refused that counts as broken
+MAX_LATE_S: Final = 1.0  # design: the 99th percentile of the DVA's replies that counts as late
+MAX_LOST: Final = 0.01  # design: share of requests lost or refused that counts as broken
 OF_DVA: Final = ("report", "list", "session")  # requests to the DVA; others go to robots
 PERCENTILES: Final = (50.0, 99.0, 99.9)
 Times = dict[str, list[float]]
@@ -134,10 +134,10 @@ def figures_of(
     slowest = requests["requests_p99_s"]
     n_requests = answered + lost.total()
     signs = {
-        f"the load itself was late by {late:.2f} s, so take more processes": late > MOST_LATE_S / 2,
-        f"p99 of replies {slowest:.2f} s": slowest > MOST_LATE_S,
-        f"{missed} of {n_requests} requests lost or refused": missed > MOST_LOST * n_requests,
-        f"{joined} of {devices} devices joined": joined < (1 - MOST_LOST) * devices,
+        f"the load itself was late by {late:.2f} s, so take more processes": late > MAX_LATE_S / 2,
+        f"p99 of replies {slowest:.2f} s": slowest > MAX_LATE_S,
+        f"{missed} of {n_requests} requests lost or refused": missed > MAX_LOST * n_requests,
+        f"{joined} of {devices} devices joined": joined < (1 - MAX_LOST) * devices,
     }
     return LoadFigures(
         devices=devices,

@@ -9,7 +9,7 @@ from dva_sim.core.registry import MAX_DEVICES
 from dva_sim.kernel.errors import DvaSimError
 
 PER_DEVICE: Final = 16  # at the DVA
-APART: Final = 200  # for all else
+OWN_FILES: Final = 200  # for all else
 
 
 class DeviceRoom(NamedTuple):
@@ -25,7 +25,7 @@ class DeviceRoom(NamedTuple):
 def room_here() -> DeviceRoom:
     """Return how many devices fit, with as many open files as the system allows."""
     usable = _usable()
-    return DeviceRoom(max(1, min(MAX_DEVICES, (usable - APART) // PER_DEVICE)), usable)
+    return DeviceRoom(max(1, min(MAX_DEVICES, (usable - OWN_FILES) // PER_DEVICE)), usable)
 
 
 def check_room_for(devices: int) -> None:
@@ -35,7 +35,7 @@ def check_room_for(devices: int) -> None:
         DvaSimError: how many files may be open, and how many it takes.
     """
     usable = _usable()
-    needed = APART + devices * PER_DEVICE
+    needed = OWN_FILES + devices * PER_DEVICE
     if usable < needed:
         raise DvaSimError(
             f"a process may open {usable} files here, and {devices} devices take {needed}; "

@@ -33,7 +33,7 @@ from dva_sim.simulation.full.verdicts import Verdict
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
-PATIENCE = 30.0  # of a part that is alone, with a DVA that does not answer [s]
+DVA_WAIT_S = 30.0  # of a part that is alone, with a DVA that does not answer [s]
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,8 @@ def run_part(
 ) -> list[Verdict]:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, SIGHUP, or the end of standard input.
 
-    One that is alone gives up if it has heard of nobody for `PATIENCE`. A DVA that is alone serves
-    others, and lasts until it is ended, or for as long as the options say.
+    A part that is alone gives up if it has heard of nobody for `DVA_WAIT_S`. A DVA that is alone
+    serves others, and lasts until it is ended, or for as long as the options say.
 
     Args:
         name: `dva`, `world` or `operator`.
@@ -229,7 +229,7 @@ def _run_part(
         serves = name == "dva" and not supervised
         usual = math.inf if serves else scenario.horizon_s
         lasts = usual if options.duration is None else options.duration
-        patience = lasts if serves else min(PATIENCE, lasts)
+        patience = lasts if serves else min(DVA_WAIT_S, lasts)
         with ending_when_asked(clock, supervised) as ending:
             if not supervised:
                 clock.run(patience)

@@ -38,7 +38,7 @@ from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import Surroundings
 
 FORMAT = 1  # of the lines
-MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
+MAX_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
 
 Line = list[Any]
 
@@ -122,7 +122,7 @@ def _all_of(file: IO[bytes]) -> bytes:
     pieces = list[bytes]()
     while piece := file.read(1 << 24):
         pieces.append(piece)
-    return b"".join(pieces)[:MOST_BYTES]
+    return b"".join(pieces)[:MAX_BYTES]
 
 
 class RunLines:

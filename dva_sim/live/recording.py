@@ -26,9 +26,9 @@ from dva_sim.agents.observation import CameraFrame
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Moment, Recorder
-from dva_sim.live.judging import FRAME, HERE, JUDGED, SEEN, SENT_LINE, LiveJudge
+from dva_sim.live.judging import FRAME, JUDGED, OWN_SIDE, SEEN, SENT_LINE, LiveJudge
 from dva_sim.live.pipes import Inlets
-from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, RunLines, lines_of_part, make_recording
+from dva_sim.live.recorded_lines import FORMAT, MAX_BYTES, RunLines, lines_of_part, make_recording
 from dva_sim.options.runs import LiveOptions
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
@@ -44,9 +44,9 @@ from dva_sim.simulation.scenario import Scenario
 
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
 SPARE = 0.5  # share of them for what strangers cause, and for what no rule is judged by
-MOST_ASKED = 5000  # requests of strangers whose answers no rule is judged by
-MOST_FACTS = 20_000  # of which one knows that they were said
-MOST_FOREIGN = 200  # devices of another make whose messages are kept
+MAX_ASKED = 5000  # requests of strangers whose answers no rule is judged by
+MAX_FACTS = 20_000  # of which one knows that they were said
+MAX_FOREIGN = 200  # devices of another make whose messages are kept
 _ENDS = re.compile(
     rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
 )
@@ -146,7 +146,7 @@ class LiveRecorder(Recorder):
     def put_new(self, *line: Any, key: str) -> None:
         """Keep a line if it says something else than the last one of that key."""
         if self._facts.get(key) != line and self.put(*line):
-            if len(self._facts) >= MOST_FACTS:
+            if len(self._facts) >= MAX_FACTS:
                 self._facts.clear()
             self._facts[key] = line
 
@@ -161,7 +161,7 @@ class LiveRecorder(Recorder):
 
     def here(self, nodes: Iterable[str]) -> None:
         """Note the devices of this process; only this part writes down what they send."""
-        self.put(HERE, self._clock.now, sorted(nodes))
+        self.put(OWN_SIDE, self._clock.now, sorted(nodes))
 
     @override
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
@@ -230,7 +230,7 @@ class LiveRecorder(Recorder):
             return False
         if (number := _NUMBER.search(payload)) is not None:
             self._asked[source, number[1]] = None
-            if len(self._asked) > MOST_ASKED:
+            if len(self._asked) > MAX_ASKED:
                 self._asked.popitem(last=False)
         return True
 
@@ -238,7 +238,7 @@ class LiveRecorder(Recorder):
         """Return True for a message from somebody who keeps no record for us."""
         if self.is_own(source) or self._left() <= SPARE * BYTES_PER_SECOND:
             return False
-        if source not in self._foreign and len(self._foreign) >= MOST_FOREIGN:
+        if source not in self._foreign and len(self._foreign) >= MAX_FOREIGN:
             self.counters[_NOT_KEPT] += 1
             return False
         if not self._is_message(data):
@@ -376,7 +376,7 @@ class Keeper:
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
         start[HELD_TO] = terms_of(scenario, attended=True).about_robots()
         self.problem: str | None = None
-        self._room = MOST_BYTES
+        self._room = MAX_BYTES
         self._file = _emptied(self.path)
         self.inlets = Inlets(self.keep, judge, also)
         self._lock = threading.Lock()
@@ -393,7 +393,7 @@ class Keeper:
                 return
             self._room -= len(lines)
             if self._room < 0:
-                self.problem = f"it has come to {MOST_BYTES >> 20} MB"
+                self.problem = f"it has come to {MAX_BYTES >> 20} MB"
                 return
             try:
                 while lines:

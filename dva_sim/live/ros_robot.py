@@ -28,7 +28,7 @@ from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.lone_robot import lone_robot
 
-MOST_WAITING: Final = 1000  # lines; what is more is not told
+MAX_WAITING: Final = 1000  # lines; what is more is not told
 OTHER_NUMBER: Final = "--number gives the robot another id"
 LAST_LINES: Final = 0.5  # for what waits when all is over [s]
 
@@ -41,7 +41,7 @@ class LineWriter:
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
-        self._lines: queue.Queue[str | None] = queue.Queue(MOST_WAITING)
+        self._lines: queue.Queue[str | None] = queue.Queue(MAX_WAITING)
         self._thread = threading.Thread(target=self._say, args=(say,), daemon=True)
         self._thread.start()
 

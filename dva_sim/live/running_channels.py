@@ -20,7 +20,7 @@ from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import Scenario, site_of
 
-MOST_SENT: Final = 4000  # commands whose time of sending is remembered
+MAX_SENT: Final = 4000  # commands whose time of sending is remembered
 HAZARD_S: Final = 1.0  # between two looks at the hazards, in the time of the run [s]
 _NUMBER = re.compile(r"<MessageID>(\d{1,10})</MessageID>")
 
@@ -135,7 +135,7 @@ class RunningChannels:
     def _went(self, when: float, source: str, destination: str, text: str) -> ChannelMessage:
         if "<SetTeleOp>" in text and (number := _NUMBER.search(text)) is not None:
             self._sent[source, int(number[1])] = when
-            if len(self._sent) > MOST_SENT:
+            if len(self._sent) > MAX_SENT:
                 self._sent.popitem(last=False)
         data = text.encode()
         return self._message(Sent(when, source, destination, len(data), data))

@@ -17,7 +17,7 @@ from dva_sim.kernel.makers import maker
 
 QUEUE_LIMIT = 1000  # requests waiting at one requester
 ROUND_TRIPS_KEPT = 100_000
-MOST_ANSWERED = 64  # deadlines of requests that were answered meanwhile
+MAX_ANSWERED = 64  # deadlines of requests that were answered meanwhile
 
 Answer = Callable[[bytes], object]
 
@@ -242,7 +242,7 @@ class Requester:
     def _attempt(self, request: _Asked) -> None:
         """Send a request, over a new connection if there is none."""
         request.attempts += 1
-        if len(self._deadlines) > MOST_ANSWERED + 2 * len(self._open):
+        if len(self._deadlines) > MAX_ANSWERED + 2 * len(self._open):
             # The first stays, as its event is on its way.
             first, *others = self._deadlines
             self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])

@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.plugins import Plugins
-from dva_sim.network.request_window import MOST, RequestWindow
+from dva_sim.network.request_window import MAX_UNANSWERED, RequestWindow
 
 
 class Command(Protocol):
@@ -203,7 +203,7 @@ class Paced(Requested):
     def begin(self, line: Line) -> None:
         self.line = line
         self._window = RequestWindow(line.rate_hz)
-        line.open_requests(MOST)
+        line.open_requests(MAX_UNANSWERED)
 
     @override
     def offer(self, command: Command) -> None:

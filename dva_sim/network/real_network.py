@@ -21,7 +21,7 @@ from dva_sim.network.realtime import LiveClock
 
 DRAIN: Final = 64  # messages read from one place before others have their turn
 LARGEST: Final = 65_536  # of a request or a reply [B]
-LARGEST_PICTURE: Final = 2_000_000  # of a publication [B]
+MAX_PICTURE: Final = 2_000_000  # of a publication [B]
 
 
 class NetworkError(DvaSimError):

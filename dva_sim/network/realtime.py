@@ -18,8 +18,8 @@ from typing_extensions import override
 from dva_sim.kernel.clock import US, Clock
 
 HEEDED_SLEEP: Final = 1.0  # of a machine that was suspended [s]
-AT_ONCE = 500  # events that are late, before messages have their turn
-LONGEST_WAIT = 60.0  # of one poll [s]
+LATE_EVENTS_PER_TURN = 500  # events that are late, before messages have their turn
+MAX_WAIT = 60.0  # of one poll [s]
 
 POLLIN: Final = int(zmq.POLLIN)  # pyzmq's enumerations cost more than a system call
 
@@ -188,7 +188,7 @@ class LiveClock(Clock):
         """Wait for the next event or message; events that are due by then go first."""
         due = min(self.env.peek(), end)
         wait = (due - self._real()) / US
-        wait = 0.0 if wait < 0.0 else wait if wait < LONGEST_WAIT else LONGEST_WAIT
+        wait = 0.0 if wait < 0.0 else wait if wait < MAX_WAIT else MAX_WAIT
         ready = self._poller.poll(wait)
         self._look_for_sleep()
         self._catch_up(end)
@@ -204,7 +204,7 @@ class LiveClock(Clock):
         env = self.env
         real = self._real()
         until = real if real < end else end
-        for _ in range(AT_ONCE):
+        for _ in range(LATE_EVENTS_PER_TURN):
             due = env.peek()
             if due > until:
                 break
@@ -255,7 +255,7 @@ class ProgramClock(LiveClock):
                 handler()
 
 
-MOST_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
+MAX_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
 HEEDED = 0.02  # what is less late is in time [s]
 FASTEST = 20.0  # that a paced clock goes, as a multiple of real time
 
@@ -264,7 +264,7 @@ class PacedClock(LiveClock):
     """Virtual time at the pace of the wall clock, or a multiple of it, which can be halted.
 
     A callback that takes too long makes it lag; it then runs after the wall clock, event by event
-    and in order, and what it lags by more than `MOST_BEHIND` is given up for good.
+    and in order, and what it lags by more than `MAX_BEHIND` is given up for good.
 
     Args:
         factor: Virtual seconds per real second.
@@ -331,12 +331,12 @@ class PacedClock(LiveClock):
     @override
     def _wait(self, end: float) -> None:
         # Pulses have their turn between events and messages.
-        wait = LONGEST_WAIT
+        wait = MAX_WAIT
         if not self._halted:
             wait = (min(self.env.peek(), end) - self._real()) / US / self._factor
         if self._pulses:
             wait = min(wait, min(pulse.due for pulse in self._pulses) - time.monotonic())
-        ready = self._poller.poll(max(0.0, min(LONGEST_WAIT, wait)))
+        ready = self._poller.poll(max(0.0, min(MAX_WAIT, wait)))
         self._look_for_sleep()
         self._catch_up(end)
         for pulse in self._pulses:
@@ -350,7 +350,7 @@ class PacedClock(LiveClock):
     def _catch_up(self, end: float) -> None:
         # Those who watch the lag are notified before late events happen.
         env = self.env
-        for _ in range(AT_ONCE):
+        for _ in range(LATE_EVENTS_PER_TURN):
             due = env.peek()
             if due > min(self._real(), end):
                 break
@@ -367,9 +367,9 @@ class PacedClock(LiveClock):
             self._worst = behind
         if behind > HEEDED:
             self.on_late(behind)
-        if behind > MOST_BEHIND:
-            self.given_up += behind - MOST_BEHIND
-            self._rebase(int(due + MOST_BEHIND * self._factor * US))
+        if behind > MAX_BEHIND:
+            self.given_up += behind - MAX_BEHIND
+            self._rebase(int(due + MAX_BEHIND * self._factor * US))
 
 
 class _Pulse:

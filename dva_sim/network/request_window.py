@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-MOST = 64  # unanswered at all; a second each way needs 20 at ten commands a second
+MAX_UNANSWERED = 64  # unanswered at all; a second each way needs 20 at ten commands a second
 _FIRST = 4
 _QUEUE = 0.5  # requests; more than that in a queue is a queue
 _ROUND_TRIP_S = 30.0  # the least one of so long: a path may become longer
@@ -99,7 +99,7 @@ class RequestWindow:
         if self._queue_seen is not None and now - self._queue_seen < _RATE_S and max(rates) > 0.0:
             self.size = min(self.size + 1, self._youngest(least, max(rates)))
         elif self._was_short:
-            self.size = min(MOST, 2 * self.size if self._doubles else self.size + 1)
+            self.size = min(MAX_UNANSWERED, 2 * self.size if self._doubles else self.size + 1)
         self._trips = []
         self._was_short = False
         self._last_of_round = self._sent

@@ -187,7 +187,7 @@ def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
 # but not while somebody listens and hangs up, so the first one is what limits that storm.
 RECONNECT_FIRST = 250  # [ms]
 RECONNECT_MAX = 4_000  # [ms]
-PATIENCE = 3  # times that a peer may hang up in the handshake before it is told
+MAX_HANGUPS = 3  # times that a peer may hang up in the handshake before it is told
 UNKNOWN_KEYS_REPORTED = 100  # unknown keys that are told one by one; there can be any number
 EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
 
@@ -469,9 +469,9 @@ class Security:
             return
         # A connection may break in its handshake by chance, but hardly again and again.
         handshake.hang_ups += 1
-        if handshake.hang_ups == PATIENCE:
+        if handshake.hang_ups == MAX_HANGUPS:
             self._greet(way, handshake)
-        elif handshake.hang_ups == 2 * PATIENCE and not handshake.reported:
+        elif handshake.hang_ups == 2 * MAX_HANGUPS and not handshake.reported:
             # A greeting has not helped.
             self._tell_once(handshake)
 

@@ -12,7 +12,7 @@ from dva_sim.network.realtime import Socket, has_more
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
-MOST_PARTS: Final = 2000  # of a message; the route of a request through proxies is part of it
+MAX_PARTS: Final = 2000  # of a message; the route of a request through proxies is part of it
 DROPPED_AT_ONCE: Final = 2000  # parts of a message that has too many
 HEARD_AT_ONCE: Final = 256  # subscriptions: others may send them faster than they can be read
 
@@ -46,7 +46,7 @@ def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
     """
     frame = recv(socket, NOBLOCK, False)
     parts = [frame.bytes]
-    while frame.more and len(parts) < MOST_PARTS:
+    while frame.more and len(parts) < MAX_PARTS:
         frame = recv(socket, NOBLOCK, False)
         parts.append(frame.bytes)
     return parts, frame

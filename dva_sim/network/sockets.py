@@ -23,7 +23,7 @@ from dva_sim.network.messaging import OnReply
 from dva_sim.network.real_network import (
     DRAIN,
     LARGEST,
-    LARGEST_PICTURE,
+    MAX_PICTURE,
     NetworkError,
     RealNetwork,
 )
@@ -185,7 +185,7 @@ class SocketSubscription:
 
 
 DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
-LARGEST_TOPIC: Final = 512  # ZeroMQ drops a subscriber who sends longer messages [B]
+MAX_TOPIC: Final = 512  # ZeroMQ drops a subscriber who sends longer messages [B]
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
@@ -195,7 +195,7 @@ READ_KEYS: Final = 1.0  # between looks whether keys have come or gone [s]
 BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s]
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
-MOST_SOCKETS: Final = 60_000
+SOCKET_LIMIT: Final = 60_000
 # A peer that loses its power disappears without closing its connections. Without these options a
 # subscriber would wait for ever and a request for its time-out, and a listener would keep dead
 # connections.
@@ -268,7 +268,7 @@ class SocketNetwork(RealNetwork):
         self._options = options_of(zeromq or ZeromqConfig())
         self._context: zmq.Context[Socket] = zmq.Context()
         # Each connection needs three; the system's own limit of open files comes first.
-        self._context.set(zmq.MAX_SOCKETS, MOST_SOCKETS)
+        self._context.set(zmq.MAX_SOCKETS, SOCKET_LIMIT)
         self._ring = ring
         self._aside = Poller()  # what can wait is looked at now and then
         self._security = Security(self._context, self._aside, ring, self._refused)
@@ -484,7 +484,7 @@ class SocketNetwork(RealNetwork):
     def _listener(self, kind: int, node: str) -> Socket:
         socket = self._socket(kind, LISTENER)
         socket.linger = LINGER
-        socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_TOPIC if kind == zmq.XPUB else LARGEST)
+        socket.setsockopt(zmq.MAXMSGSIZE, MAX_TOPIC if kind == zmq.XPUB else LARGEST)
         try:
             self._security.bind_server(socket, node)
         except DvaSimError:
@@ -496,7 +496,7 @@ class SocketNetwork(RealNetwork):
         """Return a socket of `node`, connected to `peer` if there is a way to it."""
         socket = self._socket(kind, CLIENT)
         socket.linger = 0
-        socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
+        socket.setsockopt(zmq.MAXMSGSIZE, MAX_PICTURE if kind == zmq.SUB else LARGEST)
         self._clients.setdefault(peer, {})[socket] = node
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)

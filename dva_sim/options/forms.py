@@ -9,9 +9,9 @@ from inspect import Signature, cleandoc, signature
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
-MOST_SEED = 2**63 - 1
-MOST_JOBS = 1024
-MOST_PORT = 65_535
+MAX_SEED = 2**63 - 1
+MAX_JOBS = 1024
+MAX_PORT = 65_535
 SCENARIOS = "experiments/scenarios", "experiments/scenarios/tasks"
 
 
@@ -37,7 +37,7 @@ class OptionForm(NamedTuple):
     names: tuple[str, ...] = ()
     metavar: str = ""
     least: int = 0
-    most: int = MOST_SEED
+    most: int = MAX_SEED
     above: float = 0.0
     words: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
@@ -65,7 +65,7 @@ def argument(
     )
 
 
-def port_form(help: str, *names: str, most: int = MOST_PORT) -> OptionForm:
+def port_form(help: str, *names: str, most: int = MAX_PORT) -> OptionForm:
     """Return the form of an option for a port of this machine."""
     return OptionForm(help, names=names, metavar="PORT", most=most)
 
@@ -85,7 +85,7 @@ JOBS = OptionForm(
     "Number of processes; default: one for each core.",
     names=("-j", "--jobs"),
     least=1,
-    most=MOST_JOBS,
+    most=MAX_JOBS,
 )
 Changes = Annotated[tuple[str, ...], CHANGES]
 Settings = Annotated[Mapping[str, Any] | Iterable[str], CHANGES]

@@ -11,7 +11,7 @@ from typing import Final
 
 from dva_sim.protocol.control_room import EventStatus
 
-MOST_REGIONS: Final = 16  # that one DVA serves
+MAX_REGIONS: Final = 16  # that one DVA serves
 
 
 @dataclass(frozen=True, slots=True)

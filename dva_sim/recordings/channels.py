@@ -22,7 +22,7 @@ from dva_sim.core.events import Event
 from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
 from dva_sim.protocol.facts import Fact
 from dva_sim.recordings import messages
-from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
+from dva_sim.recordings.messages import FRAME, ORIGIN_POSE, XML, ChannelMessage, stamped
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.full.observation_json import as_plain
@@ -126,7 +126,7 @@ def _pose(name: str, what: str, p: TrackPoint) -> ChannelMessage:
 GRIDS = "/fields/"
 PERIOD_S = 2.0  # between two grids [s]
 CELL = 0.5  # [m]
-MOST_CELLS = 20_000  # of a grid; on a larger site cells are larger
+MAX_CELLS = 20_000  # of a grid; on a larger site cells are larger
 DIGITS = 11  # of the 23 binary ones of a number: one part in 4000, and half the file
 
 
@@ -135,7 +135,7 @@ def grids(playback: Playback) -> Iterator[ChannelMessage]:
     real = sorted((i for i in playback.incidents if not i.false_alarm), key=lambda i: i.kind)
     whats = dict.fromkeys(what for incident in real for what in incident.hazard.shows)
     west, south, east, north = playback.site.extent
-    cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
+    cell = max(CELL, ((east - west) * (north - south) / MAX_CELLS) ** 0.5)
     first = min((incident.start for incident in real), default=math.inf)
     for number in range(int(playback.duration / PERIOD_S) + 1):
         time = number * PERIOD_S
@@ -183,7 +183,7 @@ BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
 TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
 PERSON = 0.25  # radius [m]
 STEP_S = 1.0  # between updates of a hazard [s]
-LEAST_GROWTH = 0.05  # less is not drawn again [m]
+MIN_GROWTH = 0.05  # less is not drawn again [m]
 
 
 def bodies(playback: Playback) -> Iterator[ChannelMessage]:
@@ -218,7 +218,7 @@ def hazards(playback: Playback) -> Iterator[ChannelMessage]:
         drawn = -math.inf
         for time in _steps(incident.start, until):
             radius = incident.hazard.radius(time)
-            if radius - drawn >= LEAST_GROWTH:
+            if radius - drawn >= MIN_GROWTH:
                 drawn = radius
                 yield disc(time, number, incident.hazard)
         if until < playback.duration:
@@ -333,7 +333,7 @@ def _lines(segments: Any, code: str) -> dict[str, Any]:
     ends = [messages.point(*end) for x1, y1, x2, y2 in segments for end in ((x1, y1), (x2, y2))]
     return {
         "type": 2,
-        "pose": HERE,
+        "pose": ORIGIN_POSE,
         "thickness": 2.0,
         "scale_invariant": True,
         "points": ends,

@@ -78,7 +78,7 @@ def pose(x: float, y: float, heading: float = 0.0, z: float = 0.0) -> dict[str, 
     return {"position": point(x, y, z), "orientation": turned(heading)}
 
 
-HERE = pose(0.0, 0.0)
+ORIGIN_POSE = pose(0.0, 0.0)
 
 
 def colour(code: str, opacity: float = 1.0) -> dict[str, float]:

@@ -29,9 +29,9 @@ UNITS: Final = (
 )
 COLUMNS: Final = "t_s,came_s,at_s,x_mps2,y_mps2,z_mps2,orientation_deg"
 APP: Final = "# app "
-LONGEST_S: Final = 1e6  # of a run: ten days
+MAX_DURATION_S: Final = 1e6  # of a run: ten days
 STRONGEST_MPS2: Final = 1e5  # along an axis: ten times what breaks a phone
-MOST_BYTES: Final = 64_000_000  # of a file: about two hours at 60 samples a second
+MAX_BYTES: Final = 64_000_000  # of a file: about two hours at 60 samples a second
 
 
 class NoMotionOfOursError(ConfigError):
@@ -110,7 +110,7 @@ class MotionWriter:
     def __init__(self, path: Path) -> None:
         self.name = path.name
         self._file = path.open("x", encoding="utf-8", buffering=1)
-        self._left = MOST_BYTES
+        self._left = MAX_BYTES
         self._first = 0.0
         self._begun = False
         for line in (FIRST_LINE, *UNITS, COLUMNS):
@@ -177,7 +177,7 @@ def _sample(line: str) -> MotionSample:
         raise ValueError(f"orientation_deg {angle}")
     times = float(stamp), float(came), float(at)
     axes = float(x), float(y), float(z)
-    bounds = zip((*times, *axes), (*(LONGEST_S,) * 3, *(STRONGEST_MPS2,) * 3), strict=True)
+    bounds = zip((*times, *axes), (*(MAX_DURATION_S,) * 3, *(STRONGEST_MPS2,) * 3), strict=True)
     if not all(abs(value) <= bound for value, bound in bounds):
         raise ValueError("a value that no phone's sensor has")
     return MotionSample(*times, axes, angle)
@@ -188,7 +188,7 @@ def _app(content: dict[str, Any]) -> MotionApp:
     profile = validate(PhoneProfile, content["profile"], lambda problem, _: ConfigError(problem))
     at = float(content["at_s"])
     period = float(content["period_s"])
-    if not (abs(at) <= LONGEST_S and 1e-4 <= period <= LONGEST_S):
+    if not (abs(at) <= MAX_DURATION_S and 1e-4 <= period <= MAX_DURATION_S):
         raise ValueError("an app at no time of a run")
     return MotionApp(at, period, (x, y, z), content["ios"] is True, profile)
 

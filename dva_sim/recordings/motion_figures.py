@@ -13,9 +13,9 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.motion import MotionSample, PhoneMotion
 
 GAP: Final = 3.0  # median intervals: a longer one is a gap
-AT_REST: Final = 2.0  # the quietest stretch of so long counts as rest [s]
-LEAST: Final = 30  # samples
-LEAST_STEP_S: Final = 1e-6  # between two of them: those nearer are of one moment
+REST_S: Final = 2.0  # the quietest stretch of so long counts as rest [s]
+MIN_SAMPLES: Final = 30  # samples
+MIN_STEP_S: Final = 1e-6  # between two of them: those nearer are of one moment
 
 
 class MotionFigures(NamedTuple):
@@ -54,9 +54,11 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
         ConfigError: it holds too few samples to tell anything.
     """
     samples = motion.samples
-    if len(samples) < LEAST:
-        raise ConfigError(f"contains {len(samples)} samples; at least {LEAST} are needed", path)
-    steps = [step for a, b in pairwise(samples) if (step := b.stamp - a.stamp) >= LEAST_STEP_S]
+    if len(samples) < MIN_SAMPLES:
+        raise ConfigError(
+            f"contains {len(samples)} samples; at least {MIN_SAMPLES} are needed", path
+        )
+    steps = [step for a, b in pairwise(samples) if (step := b.stamp - a.stamp) >= MIN_STEP_S]
     if not steps:
         raise ConfigError("contains samples of one moment only", path)
     usual = median(steps)
@@ -77,7 +79,7 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
 
 
 def _stretches(samples: list[MotionSample], step: float) -> list[list[MotionSample]]:
-    length = max(LEAST, round(AT_REST / step))
+    length = max(MIN_SAMPLES, round(REST_S / step))
     starts = range(0, max(1, len(samples) - length + 1), max(1, length // 4))
     return [samples[start : start + length] for start in starts]
 

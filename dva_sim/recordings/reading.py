@@ -41,7 +41,7 @@ from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import KINDS, QUANTITIES, Hazard, Raster, Surroundings
 from dva_sim.worlds.site import Site
 
-MOST_LEFT_OUT = 10**6  # samples of somebody who stands: days
+MAX_LEFT_OUT = 10**6  # samples of somebody who stands: days
 Records = Sequence[tuple[float, Mapping[str, Any]]]  # messages of a topic, with their times [s]
 
 
@@ -374,7 +374,7 @@ def _track(
 
 def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[TrackPoint]:
     missing = max(0, round((until - before.time) / period) - 1)
-    if missing > MOST_LEFT_OUT:
+    if missing > MAX_LEFT_OUT:
         raise ValueError(f"somebody stands for {until - before.time:g} s between two samples")
     return (before._replace(time=before.time + (n + 1) * period) for n in range(missing))
 

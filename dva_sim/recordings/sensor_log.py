@@ -19,7 +19,7 @@ from dva_sim.agents.tilt.accelerometer import GRAVITY
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import listed
 from dva_sim.kernel.yaml_files import read_text
-from dva_sim.recordings.motion import LONGEST_S, STRONGEST_MPS2, MotionSample
+from dva_sim.recordings.motion import MAX_DURATION_S, STRONGEST_MPS2, MotionSample
 
 Unit = Literal["m/s2", "g"]
 
@@ -87,7 +87,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> SensorLog:
         if samples and times_s < samples[-1].stamp:
             raise ConfigError("time goes backwards here", path, number, 1)
         xyz = (x * metre, y * metre, z * metre)
-        if times_s > LONGEST_S or max(map(abs, xyz)) > STRONGEST_MPS2:
+        if times_s > MAX_DURATION_S or max(map(abs, xyz)) > STRONGEST_MPS2:
             raise ConfigError("has a value that no phone's sensor has", path, number, 1)
         samples.append(MotionSample(times_s, math.nan, math.nan, xyz, 0))
     return SensorLog(samples, tuple(guesses))

@@ -18,7 +18,7 @@ from dva_sim.worlds.physics import World
 STOP_REPEATED: Final = (
     1.0  # design: the stop command is repeated for this time after each drive [s]
 )
-STILL: Final = 0.02  # below this it counts as standing [m/s, rad/s]
+STANDS_BELOW: Final = 0.02  # below this it counts as standing [m/s, rad/s]
 
 
 class RosBody(RobotBody):
@@ -76,7 +76,7 @@ class RosBody(RobotBody):
         ahead = math.cos(heading), math.sin(heading)
         body.velocity = motion.speed * ahead[0], motion.speed * ahead[1]
         body.angular_velocity = motion.turn_rate
-        if abs(motion.speed) <= STILL and abs(motion.turn_rate) <= STILL:
+        if abs(motion.speed) <= STANDS_BELOW and abs(motion.turn_rate) <= STANDS_BELOW:
             self.has_stood = True
 
     @override

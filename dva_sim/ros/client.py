@@ -11,10 +11,10 @@ from dva_sim.ros.rosbridge import BadOperation, decode, encode
 from dva_sim.ros.websocket import WebSocketDialer, WebSocketUrl
 
 FIRST_PAUSE = 0.5  # design: before the second attempt to connect [s]
-LONGEST_PAUSE = 2.0  # design: before another attempt to connect, at most [s]
+MAX_PAUSE = 2.0  # design: before another attempt to connect, at most [s]
 SILENT_AFTER: Final = 5.0  # design: a connection over which nothing comes is given up [s]
 LARGEST: Final = 16_000_000  # design: a larger message ends the connection [B]
-MOST_QUEUED: Final = 200_000  # design: commands are not queued behind so much [B]
+MAX_QUEUED: Final = 200_000  # design: commands are not queued behind so much [B]
 
 
 class Subscribed(NamedTuple):
@@ -90,7 +90,7 @@ class RosbridgeClient:
     def publish(self, topic: str, message: Mapping[str, Any]) -> bool:
         """Publish on an advertised topic; return False if the message cannot leave now."""
         connection = self._dialer.connection if self._dialer is not None else None
-        if not self.is_connected or connection is None or connection.waiting > MOST_QUEUED:
+        if not self.is_connected or connection is None or connection.waiting > MAX_QUEUED:
             return False
         connection.send(encode({"op": "publish", "topic": topic, "msg": message}))
         return self.is_connected
@@ -142,7 +142,7 @@ class RosbridgeClient:
         self.is_connected = False
         if self._is_over:
             return
-        self._pause = FIRST_PAUSE if was_connected else min(2.0 * self._pause, LONGEST_PAUSE)
+        self._pause = FIRST_PAUSE if was_connected else min(2.0 * self._pause, MAX_PAUSE)
         self._clock.call_after(self._pause, self.connect)
         self._on_change(why)
 
@@ -162,7 +162,7 @@ class RosbridgeClient:
         if subscription is not None and len(data) > subscription.largest:
             self._refuse(topic, f"{len(data)} bytes; at most {subscription.largest} are read")
             return
-        if subscription is None and len(data) > MOST_QUEUED:
+        if subscription is None and len(data) > MAX_QUEUED:
             self._refuse("", f"{len(data)} bytes of a topic that was not asked for")
             return
         try:

@@ -28,8 +28,8 @@ from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.stage import Stage
 
 LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
-MOST_ROBOTS: Final = 64
-MOST_DRIVERS: Final = 8  # clients that may be in control at a time
+MAX_ROBOTS: Final = 64
+MAX_DRIVERS: Final = 8  # clients that may be in control at a time
 SILENT: Final = 0.5  # design: a robot whose driver sends no command for that long is stopped [s]
 TAKE_TRIES: Final = 3  # design: a long link takes a permission's time to be connected over
 SCAN_HZ: Final = 5.0
@@ -260,7 +260,7 @@ class RosGateway:
             return
         id_tags = {robot.id_tag for robot in self.robots.values()}
         for device in reply.content.devices:
-            if device.device_type != ROBOT or len(self.robots) >= MOST_ROBOTS:
+            if device.device_type != ROBOT or len(self.robots) >= MAX_ROBOTS:
                 continue
             if device.id_tag in id_tags:
                 self.device.introduce(device.id_tag, device.address)
@@ -335,7 +335,7 @@ class RosGateway:
         """Return a driver for a client; None: too many are in control."""
         if self._free:
             return self._free.pop()
-        return self._new_driver() if len(self._drivers) < MOST_DRIVERS else None
+        return self._new_driver() if len(self._drivers) < MAX_DRIVERS else None
 
     def _new_driver(self) -> RosDriver:
         number = 2 + len(self._drivers)

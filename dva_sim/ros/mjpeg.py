@@ -14,8 +14,8 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.ros.dialling import Dialling
 
 AGAIN_AFTER: Final = 3.0  # design: from the end of a stream to the next attempt [s]
-MOST: Final = 2_000_000  # design: of a picture with its headers [B]
-AT_ONCE: Final = 1 << 16  # [B]
+MAX_PICTURE_BYTES: Final = 2_000_000  # design: of a picture with its headers [B]
+READ_BYTES: Final = 1 << 16  # [B]
 _LENGTH = re.compile(rb"\r\nContent-Length: (\d{1,7})\r\n", re.IGNORECASE)
 _TIME = re.compile(rb"\r\nX-Frame-Time-Ms: (\d{1,15})\r\n", re.IGNORECASE)
 
@@ -68,7 +68,7 @@ class MjpegReader:
     def _read(self) -> None:
         assert self._sock is not None
         try:
-            data = self._sock.recv(AT_ONCE)
+            data = self._sock.recv(READ_BYTES)
         except BlockingIOError:
             return
         except OSError:
@@ -76,7 +76,7 @@ class MjpegReader:
         self._data += data
         while self._picture():
             pass
-        if not data or len(self._data) > MOST:
+        if not data or len(self._data) > MAX_PICTURE_BYTES:
             self._end()
             self._again()
 

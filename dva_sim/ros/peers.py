@@ -22,9 +22,9 @@ Json = dict[str, Any]
 
 PER_SECOND: Final = 200.0  # design: operations that are taken; a joystick makes 50
 BURST: Final = 400.0  # design: at once
-MOST_DROPPED: Final = 20_000  # design: operations of a flood, after which it is cut off
-MOST_TOPICS: Final = 256
-MOST_BEHIND: Final = 200_000  # design: with so much on its way a peer gets no more readings [B]
+MAX_DROPPED: Final = 20_000  # design: operations of a flood, after which it is cut off
+MAX_TOPICS: Final = 256
+MAX_BEHIND: Final = 200_000  # design: with so much on its way a peer gets no more readings [B]
 SAY_AGAIN: Final = 5.0  # design: the same refusal is said no more often [s]
 EMERGENCY: Final = b"/emergency_stop"
 ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
@@ -114,7 +114,7 @@ class RosPeer:
         if self._dropped == 1:
             self.say(f"more than {PER_SECOND:g} messages a second: the rest is dropped")
             self._host.tell(f"{self.name} floods: more than {PER_SECOND:g} messages a second")
-        elif self._dropped == MOST_DROPPED:
+        elif self._dropped == MAX_DROPPED:
             self._connection.close(TOO_SLOW, "a flood of messages")
 
     def _do(self, operation: Json) -> None:
@@ -149,8 +149,8 @@ class RosPeer:
             self.say("compression is not supported: messages come as JSON")
         number_in(operation, "queue_length", 1e9)
         period = number_in(operation, "throttle_rate", 3_600_000) / 1000
-        if len(self.wants) >= MOST_TOPICS:
-            raise BadOperation(f"{MOST_TOPICS} topics are all that a client may have")
+        if len(self.wants) >= MAX_TOPICS:
+            raise BadOperation(f"{MAX_TOPICS} topics are all that a client may have")
         self.wants[topic] = PeerTopic(period)
         self._host.subscribed(self, topic)
 
@@ -194,7 +194,7 @@ class RosPeer:
         now = self._host.now()
         if subscription is None or now < subscription.sent_at + subscription.period - 1e-6:
             return
-        if self._connection.waiting <= MOST_BEHIND:
+        if self._connection.waiting <= MAX_BEHIND:
             subscription.sent_at = now
             self._connection.send(data)
 
@@ -202,13 +202,13 @@ class RosPeer:
         """Say what was refused; the same no more than once in a while."""
         now = self._host.now()
         if now - self._reported_at.get(what, -math.inf) >= SAY_AGAIN:
-            if len(self._reported_at) > MOST_TOPICS:
+            if len(self._reported_at) > MAX_TOPICS:
                 self._reported_at.clear()
             self._reported_at[what] = now
             self._send({"op": "status", "level": "error", "msg": what})
 
     def _send(self, operation: Json) -> None:
-        if self._connection.waiting <= MOST_BEHIND:
+        if self._connection.waiting <= MAX_BEHIND:
             self._connection.send(encode(operation))
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from dva_sim.agents.observation import Observation
 from dva_sim.worlds.maps import OCCUPIED, UNKNOWN, OccupancyGrid
 
 MAP: Final = "map"  # the site's frame: x east, y north; odometry does not drift, so it is odom, too
-MOST_CELLS: Final = 250_000  # design: of the map; on a larger site cells are larger
+MAX_CELLS: Final = 250_000  # design: of the map; on a larger site cells are larger
 REACH_M: Final = 8.0  # of the lidar
 Json = dict[str, Any]
 
@@ -102,7 +102,7 @@ def picture(name: str, jpeg: bytes, captured: float) -> Json:
 def occupancy(grid: OccupancyGrid) -> Json:
     """Return nav_msgs/OccupancyGrid: 0 free, 100 occupied, -1 unknown."""
     cells = grid.cells
-    step = max(1, math.ceil(math.sqrt(cells.size / MOST_CELLS)))
+    step = max(1, math.ceil(math.sqrt(cells.size / MAX_CELLS)))
     rows, columns = (-(-size // step) for size in cells.shape)
     padded = np.full((rows * step, columns * step), UNKNOWN, cells.dtype)
     padded[: cells.shape[0], : cells.shape[1]] = cells

@@ -21,9 +21,9 @@ from dva_sim.ros.rosbridge import is_finite
 
 JPEG: Final = b"\xff\xd8\xff"
 RAYS: Final = 36  # of a scan as devices get it, the first one ahead
-MOST_RANGES: Final = 20_000  # maximum scan readings
+MAX_RANGES: Final = 20_000  # maximum scan readings
 FASTEST: Final = 50.0  # design: a robot that says it is faster is not believed [m/s, rad/s]
-MOST_ANGLE: Final = 10.0  # of a scan [rad]
+MAX_ANGLE: Final = 10.0  # of a scan [rad]
 LATEST: Final = 1 << 40  # no time is later [s]
 FARTHEST: Final = 100_000.0  # design: nor one farther from its origin [m]
 
@@ -196,11 +196,11 @@ class RosReader:
         step = number(part(message, "angle_increment"), "angle_increment") * units.radians
         most = number(part(message, "range_max"), "range_max") * units.metres
         ranges = part(message, "ranges")
-        if not isinstance(ranges, list) or not 0 < len(ranges) <= MOST_RANGES:
-            raise BadReading(f"ranges is not a list of 1 to {MOST_RANGES}")
+        if not isinstance(ranges, list) or not 0 < len(ranges) <= MAX_RANGES:
+            raise BadReading(f"ranges is not a list of 1 to {MAX_RANGES}")
         if not 0.0 < most < FARTHEST:
             raise BadReading(f"range_max {most:g} m is no range")
-        if max(abs(first), abs(step)) > MOST_ANGLE:
+        if max(abs(first), abs(step)) > MAX_ANGLE:
             raise BadReading(f"angles of {first:g} and {step:g} rad are none")
         nearest = [most] * RAYS
         for index, value in enumerate(ranges):

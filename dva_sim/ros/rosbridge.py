@@ -10,7 +10,7 @@ import json
 import math
 from typing import Any, Final
 
-MOST_NAME: Final = 256  # of a topic, a service or a type
+MAX_NAME: Final = 256  # of a topic, a service or a type
 
 
 class BadOperation(Exception):
@@ -58,8 +58,8 @@ def name_in(operation: dict[str, Any], key: str) -> str:
         BadOperation: it is missing, or too long.
     """
     name = operation.get(key)
-    if not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
-        raise BadOperation(f"{operation['op']} has no {key}, or a longer one than {MOST_NAME}")
+    if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME:
+        raise BadOperation(f"{operation['op']} has no {key}, or a longer one than {MAX_NAME}")
     return name
 
 

@@ -23,9 +23,9 @@ from dva_sim.worlds.site import Site
 Json = dict[str, Any]
 Answer = Callable[[bool, Json], object]
 
-MOST_PEERS: Final = 16  # clients that may do everything; any other may only stop robots
-MOST_SERVED: Final = 32  # design: of both together
-MOST_CONNECTIONS: Final = 64  # design: the others have not shown a token yet
+MAX_PEERS: Final = 16  # clients that may do everything; any other may only stop robots
+MAX_SERVED: Final = 32  # design: of both together
+MAX_CONNECTIONS: Final = 64  # design: the others have not shown a token yet
 STOPS = 1  # rank of a client
 DOES_ALL = 2  # rank of a client
 PING: Final = 2.0  # design: between two pings [s]
@@ -83,7 +83,7 @@ class RosbridgeServer:
         self._site = site
         self._admission = port.admission()
         self._tell = tell
-        self._places = PortConnections(MOST_CONNECTIONS, MOST_SERVED)
+        self._places = PortConnections(MAX_CONNECTIONS, MAX_SERVED)
         self._peers: dict[WebSocketConnection, RosPeer | None] = {}
         self._count = 0
         self._map = b""
@@ -167,7 +167,7 @@ class RosbridgeServer:
     def _admit(self, peer: RosPeer, place: PortConnection) -> None:
         """Give a client with a token its rank; those beyond the limit may still stop robots."""
         others = [each for each in self._peers.values() if each is not None and each is not peer]
-        peer.only_stops = sum(not each.only_stops for each in others) >= MOST_PEERS
+        peer.only_stops = sum(not each.only_stops for each in others) >= MAX_PEERS
         rank = STOPS if peer.only_stops else DOES_ALL
         place.begin(rank, self._clock.now, is_limited=not peer.only_stops)
         self.tell(f"{peer.name} has come{', and may only stop robots' if peer.only_stops else ''}")

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from websockets.server import ServerProtocol
 
 FLUSH: Final = 0.01  # design: between two attempts to send what waits [s]
-AT_ONCE: Final = 1 << 16  # design: read before other sources have their turn [B]
-MOST_WAITING: Final = 8_000_000  # design: of a peer [B]
+READ_BYTES: Final = 1 << 16  # design: read before other sources have their turn [B]
+MAX_WAITING: Final = 8_000_000  # design: of a peer [B]
 LINGERS: Final = 0.5  # design: a bridge may take to read the last commands of a run [s]
 SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
 NORMAL = 1000  # close code of RFC 6455
@@ -125,7 +125,7 @@ class WebSocketConnection:
             self._sock.shutdown(socket.SHUT_WR)
             while (left := until - time.monotonic()) > 0.0:
                 self._sock.settimeout(left)
-                if not self._sock.recv(AT_ONCE):
+                if not self._sock.recv(READ_BYTES):
                     return
 
     def push(self) -> None:
@@ -139,10 +139,10 @@ class WebSocketConnection:
             return False
         try:
             while self._buffer:
-                sent = self._sock.send(memoryview(self._buffer)[:AT_ONCE])
+                sent = self._sock.send(memoryview(self._buffer)[:READ_BYTES])
                 del self._buffer[:sent]
         except BlockingIOError:
-            if len(self._buffer) > MOST_WAITING:
+            if len(self._buffer) > MAX_WAITING:
                 self.end("does not read what it is sent")
                 return False
             if not self._flushing:
@@ -156,7 +156,7 @@ class WebSocketConnection:
 
     def _read(self) -> None:
         try:
-            data = self._sock.recv(AT_ONCE)
+            data = self._sock.recv(READ_BYTES)
         except BlockingIOError:
             return
         except OSError as error:

@@ -19,9 +19,9 @@ from typing_extensions import override
 if TYPE_CHECKING:
     import asyncio
 
-MOST_WAITING = 64  # lines
-MOST_LINE = 32 << 20  # of one that is read [B]; a scene has a few hundred thousand
-AT_ONCE = 1 << 16  # that are read [B]
+MAX_WAITING = 64  # lines
+MAX_LINE = 32 << 20  # of one that is read [B]; a scene has a few hundred thousand
+READ_BYTES = 1 << 16  # that are read [B]
 
 Line = dict[str, Any]
 
@@ -42,8 +42,8 @@ class Lines:
         first, *rest = data.split(b"\n")
         self._pieces.append(first)
         self._size += len(first)
-        if self._size > MOST_LINE:
-            raise ValueError(f"a line is longer than {MOST_LINE} bytes")
+        if self._size > MAX_LINE:
+            raise ValueError(f"a line is longer than {MAX_LINE} bytes")
         if not rest:
             return []
         lines = [b"".join(self._pieces), *rest[:-1]]
@@ -98,7 +98,7 @@ class PipeEnd:
     def read(self) -> bytes | None:
         """Return what has come since; None: nothing yet; no bytes: there will be no more."""
         try:
-            data = os.read(self._end, AT_ONCE)
+            data = os.read(self._end, READ_BYTES)
         except BlockingIOError:
             return None
         except OSError:
@@ -226,7 +226,7 @@ class LineOutbox:
         place = (kind, key) if kind in self._kinds.newest else self._number
         if self._waiting.pop(place, None) is not None:
             self.dropped += 1
-        elif len(self._waiting) >= MOST_WAITING:
+        elif len(self._waiting) >= MAX_WAITING:
             self._drop_one()
         data = json.dumps(line, separators=(",", ":"), ensure_ascii=False).encode() + b"\n"
         self._waiting[place] = kind, data

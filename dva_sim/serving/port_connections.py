@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 _LOG = logging.getLogger("uvicorn.error")  # that of the server
-MOST = 512  # connections of a port
-MOST_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
+MAX_CONNECTIONS = 512  # connections of a port
+MAX_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
 NEWCOMERS = 500  # design: that may cut others without a token [1/s]
 SILENT = 5.0  # without a token a connection is cut after this [s]
 IDLE = 20.0  # with one, between two requests [s]; longer than the server keeps it open itself
@@ -80,7 +80,7 @@ class PortConnections:
         dropped: Number of connections that were cut, by the reason.
     """
 
-    def __init__(self, most: int = MOST, most_served: int = MOST_SERVED) -> None:
+    def __init__(self, most: int = MAX_CONNECTIONS, most_served: int = MAX_SERVED) -> None:
         self._most = most
         self._most_served = most_served
         self._turn = most / NEWCOMERS

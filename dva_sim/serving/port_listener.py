@@ -19,14 +19,14 @@ from typing import Final
 
 from dva_sim.serving.connection import HttpProtocol
 from dva_sim.serving.port_connections import (
-    MOST,
-    MOST_SERVED,
+    MAX_CONNECTIONS,
+    MAX_SERVED,
     SILENT,
     PortConnection,
     PortConnections,
 )
 
-AT_ONCE: Final = 32  # connections accepted before the loop serves others again
+ACCEPTS_PER_TURN: Final = 32  # connections accepted before the loop serves others again
 SERVED_AT_ONCE: Final = 32  # connections that have said their first word, likewise
 HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS, where each costs a millisecond or two
 SWEEP: Final = 1.0  # from one look at silent connections to the next [s]
@@ -38,13 +38,13 @@ SHUTDOWN: Final = 1.0  # for the end of a TLS connection [s]
 def fitting_places(listeners: int) -> PortConnections:
     """Return the places of one of some ports: fewer where a process may open few files."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    needed = listeners * MOST + SPARE_FILES
+    needed = listeners * MAX_CONNECTIONS + SPARE_FILES
     if soft != resource.RLIM_INFINITY and soft < needed:
         most = needed if hard == resource.RLIM_INFINITY else min(hard, needed)
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
         needed = max(soft, most)
-    most = min(MOST, max(16, (needed - SPARE_FILES) // listeners))
-    return PortConnections(most, MOST_SERVED * most // MOST)
+    most = min(MAX_CONNECTIONS, max(16, (needed - SPARE_FILES) // listeners))
+    return PortConnections(most, MAX_SERVED * most // MAX_CONNECTIONS)
 
 
 class PortListener:
@@ -88,7 +88,7 @@ class PortListener:
                     place.drop()
 
     def _accept(self) -> None:
-        for _ in range(AT_ONCE):
+        for _ in range(ACCEPTS_PER_TURN):
             wait = self._places.wait(time.monotonic())
             if wait > 0.0:
                 self._pause(wait)

@@ -18,7 +18,7 @@ from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 
 READY_WITHIN = 30.0  # from the start of a process to its first word [s]
 END_WITHIN = 5.0  # for a process to end by itself once it is asked to [s]
-DYING = 0.8  # between the end of what a process says and its own [s]
+EXIT_DELAY_S = 0.8  # between the end of what a process says and its own [s]
 LOOK = 0.01  # between two looks at a process that is waited for [s]
 LAST_WORDS = 10_000  # of what a process says on standard error, in which its last line is [B]
 
@@ -76,7 +76,7 @@ class Child(subprocess.Popen[bytes]):
     def why(self) -> str:
         """Return in one line that it has ended, and why: its last words, or how it ended."""
         with suppress(subprocess.TimeoutExpired):
-            self.wait(DYING)
+            self.wait(EXIT_DELAY_S)
         code = self.returncode
         if code is None:
             return f"{self.name} has closed its pipe"

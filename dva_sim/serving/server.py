@@ -73,7 +73,7 @@ async def serve(
     await serving
 
 
-MOST_COMPLAINTS = 5
+MAX_COMPLAINTS = 5
 
 
 def limit_complaints() -> None:
@@ -101,5 +101,5 @@ class Complaints(logging.StreamHandler):  # type: ignore[type-arg]
         if cut_off or record.getMessage().startswith(self.NOISE):
             return
         self._count += 1
-        if self._count <= MOST_COMPLAINTS:  # nobody may read them
+        if self._count <= MAX_COMPLAINTS:  # nobody may read them
             super().emit(record)

@@ -19,10 +19,10 @@ from dva_sim.kernel.suggestions import either
 from dva_sim.kernel.whole_files import whole
 
 ROLES: Final = ("look", "phone", "drive", "dispatch", "supervise")
-LEAST_LETTERS: Final = 8  # of a password
-MOST_LETTERS: Final = 200  # of a password: hashing longer ones is left to nobody
-MOST_USERS: Final = 1000
-MOST_BYTES: Final = 1 << 20
+MIN_LETTERS: Final = 8  # of a password
+MAX_LETTERS: Final = 200  # of a password: hashing longer ones is left to nobody
+MAX_USERS: Final = 1000
+MAX_BYTES: Final = 1 << 20
 _NAME: Final = re.compile(r"\w[\w .-]{0,39}")
 
 
@@ -51,8 +51,8 @@ def hash_of(password: str) -> str:
     """
     from argon2 import PasswordHasher  # late: start-up
 
-    if not LEAST_LETTERS <= len(password) <= MOST_LETTERS:
-        raise ConfigError(f"a password should have {LEAST_LETTERS} to {MOST_LETTERS} characters")
+    if not MIN_LETTERS <= len(password) <= MAX_LETTERS:
+        raise ConfigError(f"a password should have {MIN_LETTERS} to {MAX_LETTERS} characters")
     return PasswordHasher().hash(password)
 
 
@@ -63,7 +63,7 @@ def is_password_of(user: User | None, password: str) -> bool:
 
     password_hash = user.password if user is not None else _NOBODYS
     try:
-        PasswordHasher().verify(password_hash, password[:MOST_LETTERS])
+        PasswordHasher().verify(password_hash, password[:MAX_LETTERS])
     except (VerificationError, InvalidHashError):
         return False
     return user is not None
@@ -103,8 +103,8 @@ class UserFile:
             raise ConfigError(f"{problem}, and begin with a letter or digit")
         if name in self.users:
             raise ConfigError(f"there is a user {name!r} already; change that one", self.path)
-        if len(self.users) >= MOST_USERS:
-            raise ConfigError(f"there are {MOST_USERS} users already", self.path)
+        if len(self.users) >= MAX_USERS:
+            raise ConfigError(f"there are {MAX_USERS} users already", self.path)
         self._put(User(name, _role(role), hash_of(password)))
 
     def change(
@@ -171,7 +171,7 @@ def _role(role: str) -> str:
 
 def _read(path: Path) -> Collection[User]:
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_BYTES:
             raise ConfigError("is too long for a file of users", path)
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -181,7 +181,7 @@ def _read(path: Path) -> Collection[User]:
     entries = document.get("users") if isinstance(document, dict) else None
     if not isinstance(entries, list):
         raise ConfigError("is no file of users: it has no list `users`", path)
-    users = [_user(entry, path) for entry in entries[:MOST_USERS]]
+    users = [_user(entry, path) for entry in entries[:MAX_USERS]]
     if len({user.name for user in users}) < len(users):
         raise ConfigError("is no file of users: two have the same name", path)
     return users

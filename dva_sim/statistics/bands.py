@@ -39,8 +39,8 @@ from numpy.typing import ArrayLike
 
 from dva_sim.statistics.persons import LEVEL, RESAMPLES, Floats, draws, students_t
 
-FEWEST_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
-LEAST_ERROR = 0.25  # of the sample's standard error, in any draw
+MIN_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
+MIN_ERROR = 0.25  # of the sample's standard error, in any draw
 _ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
 
 
@@ -78,7 +78,7 @@ def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> 
     if not len(mean):
         return np.empty((resamples, 0))
     drawn, drawn_error, _ = moments(values, draws(len(values), resamples))
-    ratio = (drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error)
+    ratio = (drawn - mean) / np.maximum(drawn_error, MIN_ERROR * error)
     return np.where(np.isnan(ratio), 0.0, ratio)
 
 
@@ -94,7 +94,7 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
         level: Confidence level.
     """
     least = np.array([students_t(level, int(n)) for n in count])
-    few = count < FEWEST_TO_RESAMPLE
+    few = count < MIN_TO_RESAMPLE
     ranked = np.sort(ratio, axis=0)
     sizes = np.sort(abs(ratio), axis=0)
     either = np.maximum(least, sizes[place(len(ratio), level)])
@@ -120,7 +120,7 @@ def chance_above(means: Floats) -> float:
         return float(mean[0] <= 0) if len(means) > 1 else math.nan
     off = mean[0] / error[0]
     students = float(special.stdtr(len(means) - 1, -off))
-    if len(means) < FEWEST_TO_RESAMPLE:
+    if len(means) < MIN_TO_RESAMPLE:
         return students
     ratio = studentised(means[:, np.newaxis], mean, error, RESAMPLES)
     either = (abs(ratio) >= off).mean() / 2
@@ -199,7 +199,7 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
 def _reach_of_all(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
     """Return standard errors down and up to the ends of the band `(k,)`; see `reach`."""
     each = (1 - level) / max(len(count), 1)
-    many = count >= FEWEST_TO_RESAMPLE
+    many = count >= MIN_TO_RESAMPLE
     down = np.array([students_t(1 - each, int(n)) for n in count])
     up = down.copy()
     if many.any():

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from dva_sim.statistics.persons import Floats
 
-FEWEST_EACH = 6
+MIN_EACH = 6
 """Persons for each number that is learned; with fewer the slopes cost more than they are worth."""
 _DISTINCT = 1e-9  # share of its own size by which a covariate differs from the others
 
@@ -39,7 +39,7 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
     beside = np.asarray(covariates, dtype=float)
     for level in range(values.shape[1]):
         is_finite = np.isfinite(values[:, level]) & np.isfinite(beside[:, :, level]).all(axis=0)
-        if len(beside) and is_finite.sum() >= FEWEST_EACH * (1 + len(beside)):
+        if len(beside) and is_finite.sum() >= MIN_EACH * (1 + len(beside)):
             pseudo_values = _pseudo_values(values[is_finite, level], beside[:, is_finite, level].T)
             values[:, level] = np.nan
             values[is_finite, level] = pseudo_values

@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.statistics.bands import LEAST_ERROR, reach
+from dva_sim.statistics.bands import MIN_ERROR, reach
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
 
 RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
-_ONE = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
-_FEWEST = 3  # persons; of two, any are perfectly correlated
+_MAX_CORRELATION = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
+_MIN_PERSONS = 3  # persons; of two, any are perfectly correlated
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def effect_size(
     """
     first, second = paired_means(a, b, person)
     n = len(first)
-    if n < _FEWEST:
+    if n < _MIN_PERSONS:
         return EffectSize(_nothing(n), _nothing(n))
     sizes = _beside_differences, _beside_persons
     intervals = _studentised(sizes, first, second, resamples)
@@ -140,7 +140,7 @@ def variance_reduction(
     """
     first, second = paired_means(a, b, person)
     n = len(first)
-    if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
+    if n < _MIN_PERSONS or np.ptp(first) == 0 or np.ptp(second) == 0:
         return VarianceReduction(_nothing(n), _nothing(n))
     scaled = _on_fishers_scale(_correlation), _on_fishers_scale(_shared)
     intervals = _studentised(scaled, first, second, resamples)
@@ -154,7 +154,7 @@ def _on_fishers_scale(statistic: Statistic) -> Statistic:
 
     def unbounded(pairs: Pairs) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.arctanh(np.clip(statistic(pairs), -_ONE, _ONE))
+            return np.arctanh(np.clip(statistic(pairs), -_MAX_CORRELATION, _MAX_CORRELATION))
 
     return unbounded
 
@@ -301,7 +301,7 @@ def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Int
         width = 0.0 if error == 0 else np.nan
         return Interval(estimate, estimate - width, estimate + width, n)
     values, errors = drawn.of(statistic)
-    ratio = (values - estimate) / np.maximum(errors, LEAST_ERROR * error)
+    ratio = (values - estimate) / np.maximum(errors, MIN_ERROR * error)
     ratio = ratio[np.isfinite(ratio), np.newaxis]
     (down,), (up,) = reach(ratio, np.array([n]), LEVEL)
     return Interval(estimate, float(estimate - down * error), float(estimate + up * error), n)

@@ -18,7 +18,7 @@ from dva_sim.statistics.bands import band, chance_above
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means
 
 PERMUTATIONS = 10_000
-_MOST_EXACT = 14  # persons: 2 ** 14 sign flips are about as many as are drawn otherwise
+_MAX_EXACT = 14  # persons: 2 ** 14 sign flips are about as many as are drawn otherwise
 _SAME = 1e-12  # sums this close, relative to their size, differ by rounding only
 
 
@@ -122,7 +122,7 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
     off = person_means(_minus(a, b), person)[1]
     if not len(off):
         return math.nan
-    is_exact = len(off) <= _MOST_EXACT
+    is_exact = len(off) <= _MAX_EXACT
     signs = _all_signs(len(off)) if is_exact else _random_signs(len(off))
     extreme = abs(signs @ off) >= abs(float(off.sum())) - _SAME * float(abs(off).sum())
     return float(extreme.mean() if is_exact else (extreme.sum() + 1) / (PERMUTATIONS + 1))

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from types import FunctionType, MethodType, ModuleType
 from typing import Any, Final
 
-from dva_sim.agents.robot.command_queue import OTHERS, CommandQueue
-from dva_sim.agents.robot.controller import MOST_OBSERVERS
-from dva_sim.agents.robot.inquiry import MOST_READERS
-from dva_sim.agents.robot.sensors import MOST as MOST_SUBSCRIBED
+from dva_sim.agents.robot.command_queue import MAX_OF_OTHERS, CommandQueue
+from dva_sim.agents.robot.controller import MAX_OBSERVERS
+from dva_sim.agents.robot.inquiry import MAX_READERS
+from dva_sim.agents.robot.sensors import MAX_SUBSCRIPTIONS
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request, Service
@@ -27,7 +27,7 @@ from dva_sim.storms.interference import PassingMessage
 # --- S5 ----------------------------------------------------------------------------------
 
 STOPS_WITHIN = 20.0  # of the first refusal, which may be as late as others [s]
-ENOUGH = 3  # refusals in a row; the first may be of a former drive
+REFUSALS_IN_A_ROW = 3  # refusals in a row; the first may be of a former drive
 _BEGINS = b"<StartTeleOp"
 _COMMANDS = b"<SetTeleOp"
 _TELLS = b"<reply>", b"<RobotHolder>"
@@ -78,7 +78,7 @@ class RefusedDrivers:
             return
         if _BEGINS in payload:
             del self._refused[source, to]
-        elif _COMMANDS in payload and refused.count >= ENOUGH:
+        elif _COMMANDS in payload and refused.count >= REFUSALS_IN_A_ROW:
             since = now - refused.first
             if since > STOPS_WITHIN:
                 what = f"commands {self._labels[to]} on, which has refused it for {since:.0f} s"
@@ -98,7 +98,7 @@ def _refuses(data: bytes, to: str) -> bool | None:
 
 # --- S10 ---------------------------------------------------------------------------------
 
-MOST: Final = 200
+MAX_BREACHES: Final = 200
 """Elements of a container without a bound of its own, beside one for each event there ever was: a
 team of fifteen devices needs 72 at most."""
 BOUNDS: Final[dict[str, int]] = {
@@ -106,10 +106,10 @@ BOUNDS: Final[dict[str, int]] = {
     "EventTable.open": 10_000,
     "EventTable.closed": 10_000,
     "EventTable.waiting": 10_000,
-    "Confirmations._waiting": OTHERS,
-    "Inquiry._readers": MOST_READERS,
-    "RobotController.observers": MOST_OBSERVERS,
-    "SensorSubscriptions._subscribed": MOST_SUBSCRIBED,
+    "Confirmations._waiting": MAX_OF_OTHERS,
+    "Inquiry._readers": MAX_READERS,
+    "RobotController.observers": MAX_OBSERVERS,
+    "SensorSubscriptions._subscribed": MAX_SUBSCRIPTIONS,
     "Requester.round_trips": 100_000,
     "DvaAgent._last_reported": 20_000,
     "ReplyCache._replies": 64 * 1024,
@@ -164,7 +164,7 @@ def oversized(
         if isinstance(each, (dict, list, tuple, set, frozenset, deque)):
             if name in KEPT_FOR_MEASURES:
                 continue
-            bound = BOUNDS.get(name, MOST + events)
+            bound = BOUNDS.get(name, MAX_BREACHES + events)
             if len(each) > bound:
                 yield name, len(each), bound
             inner = each.values() if isinstance(each, dict) else each

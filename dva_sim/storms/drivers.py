@@ -23,8 +23,8 @@ from dva_sim.storms.intruder import Intruder, give_back
 
 FIRST_NUMBER: Final = 1000  # beyond all operators of a scenario, and all intruders
 RATES: Final = 2.0, 5.0, 8.0  # commands in a second
-LONGEST_WAIT = 20.0  # for a robot that was granted, and does not start [s]
-KEPT = 40.0  # a robot that is held and not driven: longer than a lease lasts [s]
+MAX_WAIT = 20.0  # for a robot that was granted, and does not start [s]
+HOLD_S = 40.0  # a robot that is held and not driven: longer than a lease lasts [s]
 LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
 LEVELS: Final = "teleoperation", "teleoperation", "both", "both", "missions"
 TAKEOVERS: Final[tuple[str | None, ...]] = (None, None, "ask", "force")
@@ -135,7 +135,7 @@ class BusyDriver:
         self._robot = robot
         self._session = session
         self._level = level
-        self._until = self._clock.now + LONGEST_WAIT
+        self._until = self._clock.now + MAX_WAIT
         self._insists = 0.0
         for listening in self._listening:
             listening.close()
@@ -184,7 +184,7 @@ class BusyDriver:
             wild = chance.choice((-0.3, 0.9, 3.0, 99.0)), chance.choice((0.0, -4.0, 40.0))
             self._wish = m.SetTeleOp(*wild)
         if now >= self._hushed and chance.random() < 0.1:
-            self._hushed = now + chance.choice((1.0, 4.0, 8.0, KEPT))
+            self._hushed = now + chance.choice((1.0, 4.0, 8.0, HOLD_S))
         if chance.random() < 0.5:
             body = chance.choice((m.GetMissionStatus(), m.GetSensorInfo(), m.StartTeleOp()))
             self._order(body)
@@ -235,12 +235,12 @@ class BusyDriver:
 
     def _stop_and_go_on(self) -> None:
         self._order(m.StopTeleOp())
-        self._until = self._clock.now + LONGEST_WAIT
+        self._until = self._clock.now + MAX_WAIT
         self._does = self._start
 
     def _keep(self) -> None:
         """Hold the robot without driving it, for longer than a lease lasts."""
-        self._finish(KEPT)
+        self._finish(HOLD_S)
 
     def _finish(self, after: float) -> None:
         self._does = self._wait

@@ -22,7 +22,7 @@ from dva_sim.storms.scene import StormRobot, StormScene
 
 End = Callable[[], object]
 Begin = Callable[[StormScene, Fault, random.Random], End | None]
-ANY: Final = ("robot", "operator", "driver", "guard", "dva")
+ANY_ROLE: Final = ("robot", "operator", "driver", "guard", "dva")
 DRIVERS: Final = ("operator", "driver")
 ON_MISSION: Final = ("GoTo", "Patrol", "GetMissionStatus")
 DRIVEN: Final = ("SetTeleOp", "SetTeleOp", "StartTeleOp", "PermissionGrant", *ON_MISSION)
@@ -531,7 +531,7 @@ _SHARE = (0.1, 0.9)
 FAULTS: Final[dict[str, FaultKind]] = {
     "messages-lost": FaultKind(
         "a share of the messages is lost",
-        ANY,
+        ANY_ROLE,
         _messages(i.loses),
         lasts=_SHORT,
         value=_SHARE,
@@ -540,7 +540,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "messages-late": FaultKind(
         "messages are late, by up to so many seconds",
-        ANY,
+        ANY_ROLE,
         _messages(i.delays),
         lasts=_LONG,
         value=(0.1, 8.0),
@@ -549,7 +549,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "messages-doubled": FaultKind(
         "each message comes again, within so many seconds",
-        ANY,
+        ANY_ROLE,
         _messages(i.doubles),
         lasts=_LONG,
         value=(0.0, 10.0),
@@ -558,28 +558,28 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "messages-reordered": FaultKind(
         "messages overtake each other, by up to so many seconds",
-        ANY,
+        ANY_ROLE,
         _messages(i.reorders),
         lasts=_LONG,
         value=(0.1, 4.0),
     ),
     "messages-corrupted": FaultKind(
         "a share of the messages has a wrong byte",
-        ANY,
+        ANY_ROLE,
         _messages(i.corrupts),
         lasts=_LONG,
         value=_SHARE,
     ),
     "messages-lost-in-bursts": FaultKind(
         "a share of the quarter seconds loses everything",
-        ANY,
+        ANY_ROLE,
         _messages(i.loses_in_bursts),
         lasts=_LONG,
         value=_SHARE,
     ),
     "partition": FaultKind(
         "nothing gets from one device to another",
-        ANY,
+        ANY_ROLE,
         _messages(lambda _, chance: i.loses(1.0, chance)),
         lasts=_LONG,
         value=(0.0, 0.0),
@@ -588,7 +588,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "frozen": FaultKind(
         "a process stands still: what comes and goes waits",
-        ANY,
+        ANY_ROLE,
         _freeze,
         lasts=_SHORT,
         value=(0.0, 0.0),
@@ -596,7 +596,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "replay": FaultKind(
         "so many of the last messages arrive again",
-        ANY,
+        ANY_ROLE,
         _replay,
         value=(1.0, 64.0),
         on=("StopTeleOp", "CancelMission", "StartTeleOp", "PermissionRevocation"),

@@ -14,7 +14,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode_if_valid, encode
 
 REMEMBERED = 64  # messages to a node that may be replayed: of those by the dozen, and of others
-BY_THE_DOZEN = b"<SetTeleOp", b"<HBMsg>", b"<RobotStatus>"
+FREQUENT_MESSAGES = b"<SetTeleOp", b"<HBMsg>", b"<RobotStatus>"
 
 
 class PassingMessage(NamedTuple):
@@ -63,7 +63,7 @@ class Interference:
         """Deliver, drop, delay or replace a message; see `VirtualNetwork.interference`."""
         passing = PassingMessage(source, to, payload, take)
         if isinstance(payload, bytes):
-            kind = to, any(often in payload for often in BY_THE_DOZEN)
+            kind = to, any(often in payload for often in FREQUENT_MESSAGES)
             self._past.setdefault(kind, deque(maxlen=REMEMBERED)).append(passing)
             if self._awaited:
                 self._look_out(passing)

@@ -20,7 +20,7 @@ from dva_sim.storms.intruder import NUMBER, Intruder
 from dva_sim.storms.plan import PROBES_LAST, RECOVERS_WITHIN
 from dva_sim.storms.releaser import Releaser
 
-AGAIN = 1.0  # between two attempts of a probe [s]
+RETRY_DELAY_S = 1.0  # between two attempts of a probe [s]
 USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
 STOPPED_AFTER = 5.0  # an emergency was answered [s]
 LISTED = 30  # times without a break that the DVA has to list everybody, a second apart
@@ -128,7 +128,7 @@ class RecoveryProbes:
         """Have everybody listed often enough without a break."""
 
         def again() -> None:
-            self._clock.call_after(AGAIN, self._list, expected)
+            self._clock.call_after(RETRY_DELAY_S, self._list, expected)
 
         def answered(reply: m.Reply) -> None:
             if not isinstance(reply.content, m.DeviceList):
@@ -152,7 +152,7 @@ class RecoveryProbes:
                 again()
 
         def again() -> None:
-            self._clock.call_after(AGAIN, self._report, place)
+            self._clock.call_after(RETRY_DELAY_S, self._report, place)
 
         body = m.EventReport(None, "flood", place, 0.1, 0.9, "detected")
         self._probe.ask(DVA, body, answered, again)
@@ -170,7 +170,7 @@ class RecoveryProbes:
             return
 
         def again(*_: object) -> None:
-            self._clock.call_after(AGAIN, self._ask_for, robot)
+            self._clock.call_after(RETRY_DELAY_S, self._ask_for, robot)
 
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Permission):
@@ -185,7 +185,7 @@ class RecoveryProbes:
 
     def _start(self, robot: str, session: int) -> None:
         def again(*_: object) -> None:
-            self._clock.call_after(AGAIN, self._start, robot, session)
+            self._clock.call_after(RETRY_DELAY_S, self._start, robot, session)
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
@@ -211,7 +211,7 @@ class RecoveryProbes:
                 self._start(robot, session)
 
         self._probe.ask(robot, m.SetTeleOp(0.05, 0.1), answered, session=session)
-        self._clock.call_after(AGAIN, self._drive, robot, session)
+        self._clock.call_after(RETRY_DELAY_S, self._drive, robot, session)
 
     def _stop(self, robot: str) -> None:
         def answered(reply: m.Reply) -> None:
@@ -219,7 +219,10 @@ class RecoveryProbes:
             self._clock.call_after(STOPPED_AFTER, self._look, robot)
 
         self._probe.ask(
-            robot, m.Emergency(), answered, lambda: self._clock.call_after(AGAIN, self._stop, robot)
+            robot,
+            m.Emergency(),
+            answered,
+            lambda: self._clock.call_after(RETRY_DELAY_S, self._stop, robot),
         )
 
     def _look(self, robot: str) -> None:
@@ -229,7 +232,7 @@ class RecoveryProbes:
 
     def _release(self, robot: str) -> None:
         def again() -> None:
-            self._clock.call_after(AGAIN, self._release, robot)
+            self._clock.call_after(RETRY_DELAY_S, self._release, robot)
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
@@ -245,7 +248,7 @@ class RecoveryProbes:
         session = self._session[robot]
 
         def again(*_: object) -> None:
-            self._clock.call_after(AGAIN, self._send_out, robot)
+            self._clock.call_after(RETRY_DELAY_S, self._send_out, robot)
 
         def called_back(reply: m.Reply) -> None:
             if reply.code != m.OK:

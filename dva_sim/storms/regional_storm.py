@@ -32,9 +32,16 @@ LASTS: Final = 120.0  # from then to the end [s]
 FIRST: Final = 10.0  # faults begin [s]
 KILLED: Final = "region-killed"
 ASKS_AFTER: Final = 3.0  # from the registration of the supervisor [s]
-ALONE: Final = "region-alone"  # a DVA reaches detectors and nobody else
+REGION_ALONE: Final = "region-alone"  # a DVA reaches detectors and nobody else
 RETURNED: Final = "region-given-back"  # a supervisor says so
-KINDS: Final = (KILLED, ALONE, "partition", "messages-lost", "messages-late", "messages-doubled")
+KINDS: Final = (
+    KILLED,
+    REGION_ALONE,
+    "partition",
+    "messages-lost",
+    "messages-late",
+    "messages-doubled",
+)
 _WEIGHTS: Final = (3.0, 2.0, 2.0, 1.0, 1.5, 1.0)
 _BACKBONES: Final = (None, {"delay_s": 0.05}, {"delay_s": 0.3, "jitter_s": 0.1, "loss": 0.05})
 _HALL: Final = (60.0, 40.0)  # extent of the site [m]
@@ -97,7 +104,7 @@ def _fault(chance: random.Random, dvas: list[str], devices: list[str]) -> Fault:
     at_s = round(chance.uniform(FIRST, CALM - 60.0), 3)
     if kind == KILLED:
         return Fault(kind, at_s, target=target, value=round(chance.uniform(2.0, 55.0), 3))
-    if kind == ALONE:
+    if kind == REGION_ALONE:
         return Fault(kind, at_s, for_s=round(chance.uniform(12.0, 55.0), 3), target=target)
     source = chance.choice([*(dva for dva in dvas if dva != target), *devices])
     if chance.random() < 0.5:
@@ -186,7 +193,7 @@ class RegionalStorm:
                 self.run.end_dva(number)
                 clock.call_after(fault.value, self.run.start_region_again, number)
             return
-        if fault.kind == ALONE:
+        if fault.kind == REGION_ALONE:
             clock.call_after(fault.for_s, self._cut_off(self.id_of(fault.target)))
             return
         if fault.kind == RETURNED:
@@ -216,7 +223,7 @@ class RegionalStorm:
         def meets(passing: PassingMessage) -> bool:
             ends = passing.source, passing.to
             lost = dva in ends and not any(end.startswith(detectors) for end in ends)
-            self.interference.counts[ALONE] += lost
+            self.interference.counts[REGION_ALONE] += lost
             return lost
 
         rules.append(meets)

@@ -15,7 +15,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from dva_sim.agents.robot.command_queue import EACH
+from dva_sim.agents.robot.command_queue import PER_CONNECTION
 from dva_sim.kernel.recorder import Accepted
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
@@ -186,8 +186,8 @@ class Storm(StormScene):
         stranger = self.flooder.device.id_tag
         for robot in self.robots:
             waits = waiting_of(robot.agent.inbox, stranger)
-            if waits > EACH:
-                what = f"lets {waits} messages of a stranger wait, more than {EACH}"
+            if waits > PER_CONNECTION:
+                what = f"lets {waits} messages of a stranger wait, more than {PER_CONNECTION}"
                 self.recorder.violated("S10", self.now, robot.agent.device.label, what)
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:

@@ -32,8 +32,15 @@ Make = Callable[[Point, float], Hazard]
 
 SITE: Final = "caparica"
 SOURCE: Final = (19.0, 22.5)  # in its chemistry lab, whose door opens on a corridor [m]
-AROUND: Final = ((19.5, 22.5), (21.0, 22.5), (16.0, 19.0), (13.1, 22.0), (20.0, 12.0), (19.0, 15.6))
-AWAY: Final = (10_000.0, 10_000.0)  # [m]
+NEARBY_PLACES: Final = (
+    (19.5, 22.5),
+    (21.0, 22.5),
+    (16.0, 19.0),
+    (13.1, 22.0),
+    (20.0, 12.0),
+    (19.0, 15.6),
+)
+DISTANT_PLACE: Final = (10_000.0, 10_000.0)  # [m]
 START: Final = 50.0  # [s]
 AGES: Final = (0.5, 2.0, 7.0, 20.0, 60.0, 200.0, 601.0, 1800.0, 7200.0)  # [s]
 TINY: Final = 1e-9  # age at which nothing has happened yet [s]
@@ -46,7 +53,7 @@ SLOW_PICTURE: Final = 0.5  # [s]
 CELL: Final = 1.0  # of a picture [m]
 
 # What a part is measured in is larger than this nowhere on earth.
-MOST: Final = Conditions(
+EXTREME: Final = Conditions(
     temperature=3000.0, heat_flux=1e4, extinction=1e4, co=1e6, gas=1.0, water=100.0, explosive=1e3
 )
 
@@ -141,7 +148,7 @@ class _Trial:
 
     def _answers(self, field: HazardField, order: list[int] | None = None) -> list[Conditions]:
         """Return the air at all places and ages, asked in an order; told in the usual one."""
-        queries = [(*place, START + age) for age in AGES for place in AROUND]
+        queries = [(*place, START + age) for age in AGES for place in NEARBY_PLACES]
         order = order or list(range(len(queries)))
         began = time.perf_counter()
         answers = {number: field.at(*queries[number]) for number in order}
@@ -153,12 +160,12 @@ class _Trial:
         """Yield numbers that air can have, where it is and nowhere else."""
         field = self._field()
         for before in (0.0, START):
-            if any(field.at(*place, before) != CLEAR for place in AROUND):
+            if any(field.at(*place, before) != CLEAR for place in NEARBY_PLACES):
                 yield "changes the air before it begins", f"at {before:g} s, start {START:g} s"
         for age in AGES:
-            for place in AROUND:
+            for place in NEARBY_PLACES:
                 yield from _odd(field.at(*place, START + age), f"{age:g} s, {place}")
-            if field.at(*AWAY, START + age) != CLEAR:
+            if field.at(*DISTANT_PLACE, START + age) != CLEAR:
                 yield "changes the air ten kilometres away", f"after {age:g} s"
 
     def _repeats(self) -> Iterator[Case]:
@@ -170,7 +177,7 @@ class _Trial:
         if self._answers(self._field(), shuffled) != answers:
             yield "answers differently in another order", "asked in a random order"
         later = self._hazard(LATER).field(self._site)
-        moved = [later.at(*place, START + LATER + age) for age in AGES for place in AROUND]
+        moved = [later.at(*place, START + LATER + age) for age in AGES for place in NEARBY_PLACES]
         if not all(_alike(a, b) for a, b in zip(moved, answers, strict=True)):
             yield "goes otherwise when it begins later", "the air"
 
@@ -180,22 +187,24 @@ class _Trial:
         stopped = self._field()
         stopped.until = START + STOPPED
         for age in AGES:
-            for place in AROUND:
+            for place in NEARBY_PLACES:
                 free, held = (f.at(*place, START + age) for f in (whole, stopped))
                 if age < STOPPED and not _alike(free, held):
                     yield "is changed before its source is stopped", f"{age:g} s, {place}"
                 yield from _odd(held, f"stopped, {age:g} s, {place}")
         end = START + AGES[-1]
-        if any(stopped.at(*p, end).heat_flux > whole.at(*p, end).heat_flux + 1.0 for p in AROUND):
+        if any(
+            stopped.at(*p, end).heat_flux > whole.at(*p, end).heat_flux + 1.0 for p in NEARBY_PLACES
+        ):
             yield "radiates more once its source is stopped", f"after {AGES[-1]:g} s"
 
     def _sight(self) -> Iterator[Case]:
         """Check that sight is limited by the extinction at eye height."""
         field = self._field()
         building = building_of(self._site)
-        places = SitePoints(building, np.array(AROUND))
+        places = SitePoints(building, np.array(NEARBY_PLACES))
         for age in AGES:
-            air = [field.at(*place, START + age).extinction for place in AROUND]
+            air = [field.at(*place, START + age).extinction for place in NEARBY_PLACES]
             if not field.is_hazy(START + age):
                 if max(air) > 0.0:
                     yield "is not hazy where light is lost", f"{max(air):g} /m after {age:g} s"
@@ -244,7 +253,7 @@ class _Trial:
     def _doses(self) -> Iterator[Case]:
         """Check that the dose of a person who stays is finite and never falls."""
         field = self._field()
-        for place in AROUND:
+        for place in NEARBY_PLACES:
             dose = Dose()
             last = 0.0
             for age in AGES:
@@ -265,7 +274,7 @@ class _Trial:
 
 def _odd(air: Conditions, where: str) -> Iterator[Case]:
     """Yield physically impossible conditions."""
-    for name, value, most in zip(air._fields, air, MOST, strict=True):
+    for name, value, most in zip(air._fields, air, EXTREME, strict=True):
         least = CLEAR.temperature if name == "temperature" else 0.0
         if not least <= value <= most:
             yield f"makes air with a {name} that is none", f"{value:g} at {where}"

@@ -42,14 +42,14 @@ LONG: Final = 120.0  # so long one is watched there, to see what it does late in
 DELAYS: Final = (0.0, 1.0)  # [s]
 STOP: Final = 0.5  # before the end of a way [m]
 CORRIDOR: Final = 1.0  # either side of a way [m]
-PATIENCE: Final = 30.0  # who takes so many times what full speed takes does not arrive
+MAX_TIME_FACTOR: Final = 30.0  # who takes so many times what full speed takes does not arrive
 SLOWER: Final = 6.0  # than full speed: that is slow
 REST: Final = 10.0  # watched at the end of a way [s]
 CREEP: Final = 0.005  # who wants less stands [m/s]
 SLOW: Final = 200e-6  # [s] of one answer; above that an episode is no longer fast
 SLACK: Final = 1e-9  # of limits, for rounding
 LOOKS: Final = 400  # things seen at random
-FAR: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # [m], or [rad]
+EXTREME_OFFSETS: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # [m], or [rad]
 WAITS: Final = (0.0, 0.02, 0.1, 5.0)  # between two pictures [s]
 GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # of the delay [s]
 
@@ -169,7 +169,7 @@ class _Trial:
                     yield "gives a cursor a velocity beyond reach", case
 
     def _anything(self) -> float:
-        far = self._one_of(FAR)
+        far = self._one_of(EXTREME_OFFSETS)
         return far * float(self._rng.uniform(-1, 1)) if far else 0.0
 
     def _one_of(self, values: Sequence[float]) -> float:
@@ -208,7 +208,9 @@ class _Trial:
             for delay in DELAYS:
                 case = f"{name}, delay {delay:g} s"
                 full = _way(corners).length / ROBOTS[0].speed
-                track = self._drive(self._persons[0], ROBOTS[0], name, delay, PATIENCE * full)
+                track = self._drive(
+                    self._persons[0], ROBOTS[0], name, delay, MAX_TIME_FACTOR * full
+                )
                 off = max(way.distance(Point(step.x, step.y)) for step in track)
                 arrived = [s.time for s in track if math.dist((s.x, s.y), corners[-1]) < 1.5 * STOP]
                 if off > CORRIDOR:

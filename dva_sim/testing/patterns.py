@@ -35,10 +35,10 @@ SERVICE: Final = 0.005  # of a command at the robot [s]
 SLOW_SERVICE: Final = 0.4  # [s]
 TIMEOUT: Final = 9.0  # [s]
 ATTEMPTS: Final = 3
-HELD: Final = 20  # commands that may wait at the app
+MAX_QUEUED: Final = 20  # commands that may wait at the app
 SLACK: Final = 1.0  # beyond what the link needs [s]
 NOTICED: Final = 5.0  # margin after the time-outs of all attempts [s]
-AGAIN: Final = 15.0  # after the robot is back it is driven again [s]
+RETURN_DELAY_S: Final = 15.0  # after the robot is back it is driven again [s]
 SLOW: Final = 50e-6  # [s] of one command; above that an episode is no longer fast
 
 
@@ -308,7 +308,7 @@ class _Trial:
         drive.clock.run(until)
         self.took.append(drive.spent / max(drive.offered, 1))
         yield from drive.wrong
-        if drive.held > HELD:
+        if drive.held > MAX_QUEUED:
             case = f"{drive.held} of {drive.offered} neither sent nor superseded"
             yield "loses commands, or keeps too many", case
         if drive.held < 0:
@@ -395,9 +395,9 @@ class _Trial:
         drive.clock.run(7.0)
         drive.network.come_back(ROBOT)  # type: ignore[attr-defined]
         drive.listen()
-        yield from self._run(drive, 7.0 + AGAIN)
+        yield from self._run(drive, 7.0 + RETURN_DELAY_S)
         if not any(when > 7.0 for _, when in drive.applied):
-            yield "does not go on with a robot that is back", f"within {AGAIN:g} s"
+            yield "does not go on with a robot that is back", f"within {RETURN_DELAY_S:g} s"
 
     def _leave(self, drive: TriedDrive) -> None:
         drive.listen(on=False)

@@ -12,11 +12,11 @@ import numpy as np
 
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
-from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, GuardedDrive, load_drive
+from dva_sim.worlds.drives import MAX_TICK, Drive, DriveSpec, GuardedDrive, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
 
-TICKS: Final = (0.01, 0.02, LONGEST_TICK)  # [s]
+TICKS: Final = (0.01, 0.02, MAX_TICK)  # [s]
 DRIVES: Final = 40  # random drives by themselves, of a minute each
 COMMANDS: Final = 30  # of such a drive, 2 s each
 APPROACHES: Final = 24  # angles at which a wall is hit at top speed
@@ -196,7 +196,7 @@ class _Trial:
     def _obeys(self) -> Iterator[Case]:
         """Yield cases in its body, whatever it is asked for."""
         spec = self.spec
-        world = World(hall(60.0, 60.0), LONGEST_TICK)
+        world = World(hall(60.0, 60.0), MAX_TICK)
         robot = world.add_robot("robot", spec, Pose(30.0, 30.0, 0.3))
         for speed in HOSTILE:
             for turn_rate in HOSTILE:
@@ -220,7 +220,7 @@ class _Trial:
             y = size / 2 + run * math.sin(heading)
             far = 0.0 if math.sin(heading) >= 0 else size
             wall = (size / 2, far, size / 2, size - far if number % 2 else size / 2)
-            world = World(hall(size, size, [wall]), LONGEST_TICK)
+            world = World(hall(size, size, [wall]), MAX_TICK)
             robot = world.add_robot("robot", spec, Pose(x, y, heading + math.pi))
             robot.drive(spec.max_speed, 0.0, math.inf)
             world.advance_to(3 * size / spec.max_speed)

@@ -23,8 +23,8 @@ RUNS: Final = 40  # of random readings
 SAMPLES: Final = 120  # of such a run
 SLOW: Final = 20e-6  # [s] of one reading; above that an episode is no longer fast
 HAND: Final = (19.0, 57.0)  # the largest reading that a hand can tilt to, at 45 degrees
-WITHIN: Final = 0.9  # in which a gap on the display is to be closed [s]
-NEAR: Final = 0.02  # of the full range: as good as there
+CLOSE_WITHIN_S: Final = 0.9  # in which a gap on the display is to be closed [s]
+REACHED_SHARE: Final = 0.02  # of the full range: as good as there
 HOSTILE: Final = (0.0, 1e-300, -1e-300, 1e3, -1e3, 1e9, -1e9)
 
 
@@ -276,7 +276,9 @@ class _MappingTrial:
                 one = whole.command(*reading, PERIOD)
                 halves.command(*reading, PERIOD / 2)
                 two = halves.command(*reading, PERIOD / 2)
-            if not all(math.isclose(a, b, rel_tol=NEAR) for a, b in zip(one, two, strict=True)):
+            if not all(
+                math.isclose(a, b, rel_tol=REACHED_SHARE) for a, b in zip(one, two, strict=True)
+            ):
                 case = f"{_pair_text(two)} after {2 * count} half steps, "
                 yield (
                     "integrates by steps, not by time",
@@ -322,7 +324,7 @@ class _MappingTrial:
         mapping = self.make()
         for command in ((-1.0, 0.0), (0.0, 30.0), (10.0, -30.0), (5.0, 0.0), (2.0, 1e-9)):
             for shown in ((0.0, 0.0), (10.0, 30.0), (4.0, -30.0)):
-                reading = mapping.tilt_for(command, shown, WITHIN)
+                reading = mapping.tilt_for(command, shown, CLOSE_WITHIN_S)
                 if not all(map(math.isfinite, reading)):
                     yield "would tilt to what is no number", f"for {_pair_text(command)}"
 
@@ -332,8 +334,8 @@ class _MappingTrial:
             mapping = self.make()
             shown = (0.0, 0.0)
             shown = mapping.command(0.0, 0.0, PERIOD)
-            for _ in range(round(20 * WITHIN / PERIOD)):
-                level, turn = mapping.tilt_for(command, shown, WITHIN)
+            for _ in range(round(20 * CLOSE_WITHIN_S / PERIOD)):
+                level, turn = mapping.tilt_for(command, shown, CLOSE_WITHIN_S)
                 shown = mapping.command(_cut(level, HAND[0]), _cut(turn, HAND[1]), PERIOD)
             if not _near(shown, (max(command[0], 0.0), command[1])):
                 yield (
@@ -345,7 +347,7 @@ class _MappingTrial:
 def _near(one: Pair, other: Pair) -> bool:
     level = abs(one[0] - other[0]) / LEVELS
     turn = abs(one[1] - other[1]) / MAX_TURN_DEG
-    return max(level, turn) < NEAR
+    return max(level, turn) < REACHED_SHARE
 
 
 def _cut(value: float, most: float) -> float:

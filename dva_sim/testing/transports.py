@@ -29,14 +29,14 @@ CONNECTS_S: Final = 10.0
 ARRIVES_S: Final = 5.0
 ALONE_S: Final = 0.5  # how long the operator's end waits for nobody
 SLACK_S: Final = 2.0  # of the machine, beyond what is promised
-AWAY: Final = 100  # commands sent while the robot takes nothing
+LOST_COMMANDS: Final = 100  # commands sent while the robot takes nothing
 
 CONNECTS: Final = "connects although the robot's end opens later"
 CARRIES: Final = "delivers the commands that it took, byte for byte"
 SHOWS: Final = "delivers pictures, byte for byte"
 RETURNS: Final = "returns from serve() in time"
 GOES_ON: Final = "returns from send() while the robot takes nothing"
-ALONE: Final = "raises TransportError in time where nobody is at the other end"
+NO_PEER_PROMISE: Final = "raises TransportError in time where nobody is at the other end"
 LEAVES: Final = "lets go of its ports when it is closed"
 
 
@@ -126,13 +126,16 @@ class _Trial:
             near = self._make().near(robot.place, lambda _: None)
             robot.pause()
             start = time.monotonic()
-            for number in range(1, AWAY + 1):
+            for number in range(1, LOST_COMMANDS + 1):
                 near.send(TELE_OP.command(number))
             took = time.monotonic() - start
             robot.go_on()
             near.close()
         if took > SLACK_S:
-            yield GOES_ON, f"{AWAY} commands took {took:.1f} s; should be below {SLACK_S:g} s"
+            yield (
+                GOES_ON,
+                f"{LOST_COMMANDS} commands took {took:.1f} s; should be below {SLACK_S:g} s",
+            )
 
     def _be_alone(self) -> Iterator[Case]:
         start = time.monotonic()
@@ -142,9 +145,9 @@ class _Trial:
                 self._make().near(place, lambda _: None).close()
             except TransportError:
                 if (took := time.monotonic() - start - ALONE_S) > SLACK_S:
-                    yield ALONE, f"{took:.1f} s too late"
+                    yield NO_PEER_PROMISE, f"{took:.1f} s too late"
             else:
-                yield ALONE, "it says that it is connected"
+                yield NO_PEER_PROMISE, "it says that it is connected"
 
 
 class _Robot:

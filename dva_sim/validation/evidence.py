@@ -22,7 +22,7 @@ SUBJECTS: Final[tuple[Subject, ...]] = get_args(Subject)
 RULE: Final = "Rule"
 HEADS: Final = ("line", "claim", "measured", "predicted", "band", "verdict")
 NORMAL_95: Final = 1.96  # standard errors of half a 95 % interval
-MOST_NAMED: Final = 20  # lines that miss, in a head; more would hide whether the rule holds
+MAX_NAMED: Final = 20  # lines that miss, in a head; more would hide whether the rule holds
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def headline(lines: Sequence[Evidence]) -> str:
     """
     misses = names_of_misses(lines)
     missed = ""
-    if sum(line.verdict == "misses" for line in judged(lines)) > MOST_NAMED:
+    if sum(line.verdict == "misses" for line in judged(lines)) > MAX_NAMED:
         missed = f"; those that do not, of {len(misses)} conditions, are in the tables"
     elif misses:
         missed = f"; these do not: {'; '.join(misses)}"

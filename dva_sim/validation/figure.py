@@ -25,7 +25,7 @@ _MARKS: Final[dict[Verdict, dict[str, Any]]] = {
     "misses": {"marker": "X", "ms": 7, "mfc": INK, "mec": "white", "mew": 0.5},
 }
 _REACH: Final = 90.0  # percentile of the distances from 1 that sets the vertical axis
-_LEAST: Final = 0.01  # shortest half of a vertical axis, as the logarithm of a ratio
+_MIN_HALF_AXIS: Final = 0.01  # shortest half of a vertical axis, as the logarithm of a ratio
 _MOST: Final = math.log(3.0)  # longest half
 
 
@@ -67,7 +67,7 @@ def _draw_panel(axes: Axes, lines: Sequence[Evidence]) -> None:
     if not len(every):
         return
     distance = float(np.percentile(np.abs(np.log(every[:, 1:])), _REACH))
-    reach = min(max(1.15 * distance, _LEAST), _MOST)
+    reach = min(max(1.15 * distance, _MIN_HALF_AXIS), _MOST)
     low = math.exp(-reach)
     high = math.exp(reach)
     at, _, *ends = every.T

@@ -104,7 +104,7 @@ G: Final = 9.81  # [m/s^2]
 GRIP: Final = 0.8  # friction coefficient of rubber on a dry floor
 FRICTION = 0.3  # of bumpers and walls; both multiply in a contact
 ELASTICITY = 0.1  # of bumpers and walls; both multiply in a contact
-AT_REST = 1e-3  # slower than this, brakes hold [m/s, rad/s]
+BRAKES_BELOW = 1e-3  # slower than this, brakes hold [m/s, rad/s]
 WALL = 1  # collision type
 ROBOT = 2  # collision type
 PERSON = 3  # collision type
@@ -513,7 +513,7 @@ class RobotBody(Body):
         forward = vx * cos + vy * sin
         sideways = vy * cos - vx * sin
         if wanted_speed == wanted_spin == 0.0:
-            if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
+            if abs(forward) + abs(sideways) + abs(spin) < BRAKES_BELOW:
                 body.velocity = (0.0, 0.0)
                 body.angular_velocity = 0.0
                 if not self._lock.closed:

@@ -18,17 +18,17 @@ from dva_sim.worlds.site_parts import CEILING, Compartment, Lookup, Opening, Roo
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int16]
 
-NOWHERE = -1  # label of cells in no compartment
+NO_COMPARTMENT = -1  # label of cells in no compartment
 BLOCK = 8.0  # side of a block of a bare map's floor [m]
-MOST_BLOCKS = 2000  # on a larger floor they are larger
-MOST_PIECES = 4000  # of a floor in its blocks: each is compared with each
-LEAST_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
-LEAST_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
-NEAR = 0.05  # rooms this near to each other touch [m]
+MAX_BLOCKS = 2000  # on a larger floor they are larger
+MAX_PIECES = 4000  # of a floor in its blocks: each is compared with each
+MIN_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
+MIN_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
+TOUCHING_M = 0.05  # rooms this near to each other touch [m]
 
 
 class FloorPartition(NamedTuple):
-    """Compartments, what joins them, and for each cell of the grid whose it is, or `NOWHERE`."""
+    """Compartments, what joins them, and the compartment of each cell, or `NO_COMPARTMENT`."""
 
     compartments: tuple[Compartment, ...]
     openings: tuple[Opening, ...]
@@ -93,9 +93,9 @@ def _borders(
     """Yield straight pieces of border between two rooms without a wall or a door."""
     areas = [room.area for room in rooms]
     lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
-    barriers = [shapely.LineString(line).buffer(NEAR) for line in lines]
+    barriers = [shapely.LineString(line).buffer(TOUCHING_M) for line in lines]
     near = shapely.STRtree(barriers)
-    wide = [area.buffer(NEAR, join_style="mitre") for area in areas]
+    wide = [area.buffer(TOUCHING_M, join_style="mitre") for area in areas]
     first, second = shapely.STRtree(areas).query(wide, predicate="intersects")
     for a, b in sorted((int(a), int(b)) for a, b in zip(first, second, strict=True) if a < b):
         shared = areas[a].boundary & wide[b]
@@ -103,7 +103,7 @@ def _borders(
         for ends in _straight(shared - closed).tolist():
             x1, y1, x2, y2 = _up_to(closed, ends)
             width = math.hypot(x2 - x1, y2 - y1)
-            if width >= LEAST_BORDER:
+            if width >= MIN_BORDER:
                 height = min(rooms[a].ceiling, rooms[b].ceiling)
                 names = rooms[a].name, rooms[b].name
                 yield Opening(
@@ -117,14 +117,14 @@ def _straight(lines: Any) -> Floats:
     if not parts:
         return np.empty((0, 4))
     merged: Any = shapely.line_merge(shapely.multilinestrings(parts))
-    return segments(merged.simplify(NEAR / 5))
+    return segments(merged.simplify(TOUCHING_M / 5))
 
 
 def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, float]:
-    """Return an opening lengthened where it was cut `NEAR` a wall."""
+    """Return an opening lengthened where it was cut `TOUCHING_M` a wall."""
     a = np.array(ends[:2])
     b = np.array(ends[2:])
-    along = (b - a) / np.hypot(*(b - a)) * NEAR
+    along = (b - a) / np.hypot(*(b - a)) * TOUCHING_M
     a, b = (
         end + way if closed.distance(shapely.Point(end)) < 1e-6 else end
         for end, way in ((a, -along), (b, along))
@@ -134,7 +134,7 @@ def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, flo
 
 def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
     """Return the compartment of each cell."""
-    labels = np.full(grid.cells.shape, NOWHERE, np.int16)
+    labels = np.full(grid.cells.shape, NO_COMPARTMENT, np.int16)
     for number, room in reversed(list(enumerate(rooms))):
         window = grid.window(room.polygon)
         labels[window][cells_inside(grid, segments(room.area), window)] = number
@@ -162,17 +162,17 @@ def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
     """Return the connected parts of the floor within each block of a lattice."""
     from scipy.ndimage import label  # late: start-up
 
-    labels = np.full(floor.shape, NOWHERE, np.int16)
+    labels = np.full(floor.shape, NO_COMPARTMENT, np.int16)
     total = 0
-    across = max(BLOCK / resolution, math.sqrt(np.count_nonzero(floor) / MOST_BLOCKS))
+    across = max(BLOCK / resolution, math.sqrt(np.count_nonzero(floor) / MAX_BLOCKS))
     rows, columns = (_cuts(length, across) for length in floor.shape)
     for top, bottom in itertools.pairwise(rows):
         for left, right in itertools.pairwise(columns):
             part, count = label(floor[top:bottom, left:right])
             labels[top:bottom, left:right][part > 0] = part[part > 0] + (total - 1)
             total += count
-            if total > MOST_PIECES:
-                raise ConfigError(f"the floor of a map has more than {MOST_PIECES:,} pieces")
+            if total > MAX_PIECES:
+                raise ConfigError(f"the floor of a map has more than {MAX_PIECES:,} pieces")
     return labels
 
 
@@ -187,7 +187,7 @@ def _joined(labels: Labels, resolution: float) -> Labels:
     sizes = np.bincount(labels[labels >= 0]) * resolution**2
     borders = _borders_between(labels, len(sizes))
     owner = np.arange(len(sizes))
-    while len(small := np.flatnonzero((sizes < LEAST_BLOCK) & borders.any(axis=1))):
+    while len(small := np.flatnonzero((sizes < MIN_BLOCK) & borders.any(axis=1))):
         piece = small[np.argmin(sizes[small])]
         taker = int(np.argmax(borders[piece]))
         sizes[taker] += sizes[piece]
@@ -198,7 +198,7 @@ def _joined(labels: Labels, resolution: float) -> Labels:
         borders[taker, taker] = 0
         owner[owner == piece] = taker
     _, number = np.unique(owner, return_inverse=True)
-    return np.where(labels >= 0, number[labels], NOWHERE).astype(np.int16)
+    return np.where(labels >= 0, number[labels], NO_COMPARTMENT).astype(np.int16)
 
 
 def _borders_between(labels: Labels, count: int) -> NDArray[np.int64]:
@@ -221,7 +221,7 @@ def _seams(grid: OccupancyGrid, labels: Labels, blocks: Sequence[Compartment]) -
             run = np.flatnonzero(code[row, left:] != code[row, left])
             right = left + (run[0] if len(run) else code.shape[1] - left)
             width = float(right - left) * grid.resolution
-            if width < LEAST_BORDER:
+            if width < MIN_BORDER:
                 continue
             ends = ((row + 1, left), (row + 1, right))
             (x1, y1), (x2, y2) = (grid.to_xy(*(e[::-1] if turned else e)).tolist() for e in ends)

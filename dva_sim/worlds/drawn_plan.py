@@ -29,8 +29,8 @@ from dva_sim.worlds.site_parts import (
 
 DOOR_REACH = 0.15  # a door opens walls this near to its line [m]
 SILL = 0.5  # floor on both sides of a door, in case the rooms drawn do not meet [m]
-LEAST_EXIT = 0.5  # [m]
-LEAST_HOLE = 1e-4  # a smaller one comes from lines that do not quite meet [m^2]
+MIN_EXIT = 0.5  # [m]
+MIN_HOLE = 1e-4  # a smaller one comes from lines that do not quite meet [m^2]
 NEAR_RIM = 1e-3  # of a hole [m]
 NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
 GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
@@ -138,8 +138,8 @@ def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
     """Return the exit; out is the side further out: rooms, outdoors, nothing drawn, or left."""
     x1, y1, x2, y2 = _ends(feature.shape)
     width = math.hypot(x2 - x1, y2 - y1)
-    if width < LEAST_EXIT:
-        raise feature.fail(f"an exit is at least {LEAST_EXIT:g} m wide, not {width:g} m")
+    if width < MIN_EXIT:
+        raise feature.fail(f"an exit is at least {MIN_EXIT:g} m wide, not {width:g} m")
     x = (x1 + x2) / 2
     y = (y1 + y2) / 2
     left = math.atan2(x2 - x1, y1 - y2)
@@ -197,7 +197,7 @@ def _rims(rooms: tuple[Room, ...], drawn: Any) -> Iterator[Any]:
     """Return rims of holes in the floor where nothing else is drawn: nobody drives in."""
     for hole in (hole for room in rooms for hole in room.holes):
         bare: Any = shapely.difference(shapely.Polygon(hole), drawn)
-        if bare.area > LEAST_HOLE:
+        if bare.area > MIN_HOLE:
             yield shapely.intersection(shapely.LinearRing(hole), bare.buffer(NEAR_RIM))
 
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import Guard, Plugins
 
-LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
+MAX_TICK: Final = 0.04  # that profiles are made for [s]
 CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
 
 

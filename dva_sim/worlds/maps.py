@@ -28,10 +28,10 @@ UNKNOWN = 255
 # What map_saver writes for "never seen" in a trinary map.
 UNKNOWN_SHADE = 205
 NEAR_SHADE = 10  # shades this near may have been that one
-FEW = 0.01  # share of a scale map that may have that shade by chance
+CHANCE_SHARE = 0.01  # share of a scale map that may have that shade by chance
 JPEG_BLUR = 12.0  # by how much the shades of a JPEG may be off: a half step to white
 USUAL_CELLS = 0.005, 1.0  # of a map [m]
-MOST_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
+MAX_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
 LARGEST = 5e3  # side of a map [m]
 FARTHEST = 1e7  # of a map from its origin [m]: coordinates of UTM are below
 
@@ -281,7 +281,7 @@ def doubts_of_map(path: str | Path) -> tuple[str, ...]:
     is_scale = config.mode == "scale"  # other shades than that of the unknown are measured there
     near = np.abs(shades - config.unknown_shade) <= (0 if is_scale else NEAR_SHADE)
     share = float((near & (_classify(shades, blur, config) == FREE)).mean())
-    if share > (FEW if is_scale else 0):
+    if share > (CHANCE_SHARE if is_scale else 0):
         doubts.append(
             f"{share:.1%} of its cells have {'the shade' if is_scale else 'a shade near'} "
             f"{config.unknown_shade}, which cells never seen have in trinary maps, and count as "
@@ -327,9 +327,9 @@ def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64
 def _check_size(size: tuple[int, int], document: Document, config: RosMap) -> None:
     """Refuse an image whose map would take gigabytes, or is larger than a building's."""
     columns, rows = size
-    if columns * rows > MOST_CELLS:
+    if columns * rows > MAX_CELLS:
         problem = (
-            f"image {config.image!r} is {columns} by {rows}, at most {MOST_CELLS / 1e6:g} million"
+            f"image {config.image!r} is {columns} by {rows}, at most {MAX_CELLS / 1e6:g} million"
         )
         raise document.error(f"{problem} pixels", ("image",))
     if (side := max(size) * config.resolution) > LARGEST:

@@ -26,7 +26,7 @@ STOREY = 14.5  # wanted depth of a corridor with the rooms on both its sides [m]
 CORRIDOR = (2.0, 2.6)  # width [m]
 LOBBY = (6.0, 8.0)  # width [m]
 CROSSING_EVERY = 40.0  # along the corridors [m]
-LEAST_CELL = 2.8  # width of the narrowest room [m]
+MIN_CELL = 2.8  # width of the narrowest room [m]
 WISHES = ((3.0, 3.9), (4.8, 6.5), (7.0, 9.5))  # widths that rooms would like to have [m]
 ODDS = (0.55, 0.30, 0.15)  # of these
 
@@ -195,10 +195,10 @@ def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
     wishes = list[float]()
     while sum(wishes) < length:
         wishes.append(rng.uniform(*WISHES[rng.choice(len(WISHES), p=ODDS)]))
-    if sum(wishes) - length > wishes[-1] / 2 or len(wishes) * (LEAST_CELL + 0.1) > length:
+    if sum(wishes) - length > wishes[-1] / 2 or len(wishes) * (MIN_CELL + 0.1) > length:
         wishes = wishes[:-1] or wishes
-    spare = np.array(wishes) - LEAST_CELL
-    widths = LEAST_CELL + 0.1 + (length - (LEAST_CELL + 0.1) * len(spare)) * spare / spare.sum()
+    spare = np.array(wishes) - MIN_CELL
+    widths = MIN_CELL + 0.1 + (length - (MIN_CELL + 0.1) * len(spare)) * spare / spare.sum()
     return [tenths(start + reach) for reach in (0.0, *np.cumsum(widths))]
 
 
@@ -291,7 +291,7 @@ LARGE = (
     Use("Seminar room", 1.2, ("smoke",), _rows(0.6, 1.0)),
 )
 COPY_ROOM_EVERY = 9
-MOST_BAYS = 4
+MAX_BAYS = 4
 MEDIUM_FROM = 20.0  # [m^2]
 LARGE_FROM = 36.0  # [m^2]
 
@@ -321,7 +321,7 @@ def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
 
 def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[FloorCell], float]]]:
     """Yield the needs of a house: a use, a name, and a measure of how unfit a cell is."""
-    for number in range(1, MOST_BAYS + 1):
+    for number in range(1, MAX_BAYS + 1):
         name = ROBOT_BAY.name if number == 1 else f"{ROBOT_BAY.name} {number}"
         yield ROBOT_BAY, name, lambda cell: cell.wing - cell.area / 1000
     yield CONTROL, CONTROL.name, lambda cell: cell.wing + abs(cell.area - 30) / 1000

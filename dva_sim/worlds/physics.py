@@ -17,7 +17,7 @@ import shapely
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.bodies import (
-    AT_REST,
+    BRAKES_BELOW,
     ELASTICITY,
     FRICTION,
     PERSON,
@@ -36,7 +36,7 @@ from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
 MASS: Final = 75.0  # of an adult [kg]
 RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
-MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
+MAX_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
 
 
 class PersonBody(Body):
@@ -85,13 +85,13 @@ class PersonBody(Body):
         """Apply the force of the legs for one tick; False if the person stands as requested."""
         wx, wy = self._asked.at(tick)
         vx, vy = self.velocity
-        if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
+        if wx == wy == 0.0 and abs(vx) + abs(vy) < BRAKES_BELOW:
             self.body.velocity = (0.0, 0.0)
             return bool(self._asked.coming)
         ax = (wx - vx) / RELAXATION
         ay = (wy - vy) / RELAXATION
         wish = math.hypot(ax, ay)
-        share = MASS * min(1.0, MOST_PUSH / wish) if wish > 0.0 else 0.0
+        share = MASS * min(1.0, MAX_PUSH / wish) if wish > 0.0 else 0.0
         self.body.force = (ax * share, ay * share)
         return True
 

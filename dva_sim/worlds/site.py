@@ -28,13 +28,13 @@ from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import Document, load_yaml, with_named_files
-from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
+from dva_sim.worlds.compartments import NO_COMPARTMENT, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.geojson import Feature, doubts_of_plan, read_features
 from dva_sim.worlds.maps import (
     FREE,
-    MOST_CELLS,
+    MAX_CELLS,
     OccupancyGrid,
     load_ros_map,
     outline,
@@ -129,8 +129,8 @@ class Site(FloorPlan):
 
     def compartment_at(self, x: float, y: float) -> int | None:
         """Index of the compartment around a point [m], to within a cell; None for none."""
-        label = int(self.grid.look_up(self.partition.labels, x, y, NOWHERE))
-        return None if label == NOWHERE else label
+        label = int(self.grid.look_up(self.partition.labels, x, y, NO_COMPARTMENT))
+        return None if label == NO_COMPARTMENT else label
 
     @cached_property
     def partition(self) -> FloorPartition:
@@ -266,7 +266,7 @@ PLANS = (".geojson", ".json")
 DESKS = 2  # operator desks on a bare map
 BASE_SPACING = 1.5  # between places that are not drawn [m]
 PASSED_BY = 0.5  # radius that must fit at them on a plan: more than the doors have, mostly [m]
-MOST_DETECTORS = 2000  # of a kind on a bare map; on a larger floor they are further apart
+MAX_DETECTORS = 2000  # of a kind on a bare map; on a larger floor they are further apart
 AT_RANDOM = 100  # tries, before what is left is looked at cell by cell
 DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a bare map [m]
 
@@ -444,7 +444,7 @@ class _Places:
 def _lattice(grid: OccupancyGrid, reached: NDArray[np.bool_]) -> tuple[Detector, ...]:
     """Return detectors on square lattices of cells that can be reached."""
     detectors = []
-    sparse = math.ceil(math.sqrt(np.count_nonzero(reached) / MOST_DETECTORS))
+    sparse = math.ceil(math.sqrt(np.count_nonzero(reached) / MAX_DETECTORS))
     for kind, spacing in DETECTOR_SPACING.items():
         step = max(1, round(spacing / grid.resolution), sparse)
         rows, columns = np.nonzero(reached[step // 2 :: step, step // 2 :: step])
@@ -549,10 +549,10 @@ def _check_size(floor: Any, config: SiteFile, document: Document) -> None:
     depth = ymax - ymin
     cell = config.resolution_m
     cells = width * depth / cell**2
-    if cells > MOST_CELLS:
+    if cells > MAX_CELLS:
         raise document.error(
             f"the plan is {width:,.0f} by {depth:,.0f} m: {cells / 1e6:,.0f} million cells of "
-            f"{cell:g} m, at most {MOST_CELLS / 1e6:g} million; draw less or give larger cells",
+            f"{cell:g} m, at most {MAX_CELLS / 1e6:g} million; draw less or give larger cells",
             ("resolution_m",),
         )
 

@@ -60,7 +60,7 @@ ZONES = {
 COVERAGE = {"fair": ("#f0e442", 0.24), "poor": ("#e69f00", 0.34), "none": ("#8f5b8a", 0.4)}
 WALL_WIDTH = 0.14  # as drawn [m]
 MARGIN = (0.8, 0.012)  # around the site: at least [m], of its width
-BELOW = (0.6, 0.045)  # the same for the scale bar
+SCALE_BAR_PLACE = (0.6, 0.045)  # the same for the scale bar
 ARC_POINTS = 9
 
 
@@ -114,7 +114,9 @@ def draw_site(
 def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return what a picture of a site shows, with the scale bar: ranges of x and of y [m]."""
     xmin, ymin, xmax, ymax = site.extent
-    margin, below = (max(least, share * (xmax - xmin)) for least, share in (MARGIN, BELOW))
+    margin, below = (
+        max(least, share * (xmax - xmin)) for least, share in (MARGIN, SCALE_BAR_PLACE)
+    )
     return (xmin - margin, xmax + margin), (ymin - margin - below, ymax + margin)
 
 
@@ -249,7 +251,7 @@ def _outline(area: Any) -> Outline:
 
 
 LONG_SIDE = 8.4  # of the picture [in]; a page shows 840 pixels of it
-MOST_INCHES = 18.0  # of the picture, at most [in]
+MAX_INCHES = 18.0  # of the picture, at most [in]
 INCHES_PER_METRE = 0.07
 FONT = 7.5  # of the key [pt]
 KEY = 1.25  # width of an entry of the key [in]
@@ -281,7 +283,7 @@ def poster(site: Site, coverage: bool) -> Figure:
     (left, right), (low, high) = limits(site)
     across = right - left
     up = high - low
-    long = min(MOST_INCHES, max(LONG_SIDE, INCHES_PER_METRE * max(across, up)))
+    long = min(MAX_INCHES, max(LONG_SIDE, INCHES_PER_METRE * max(across, up)))
     width, height = (long * side / max(across, up) for side in (across, up))
     handles = _handles(site, coverage)
     columns = max(3, int(width / KEY))

@@ -150,9 +150,9 @@ LINE = 1.15  # height of a line, in font sizes
 SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
 GAP = 0.2  # between a name and the walls [m]
 PLACES = 9  # tried along each side of a room
-MOST_LINES = 3
+MAX_LINES = 3
 # How much less legible a name is that is turned, covers something, is only a number.
-TURNED = 0.8
+TURNED_SHARE = 0.8
 COVERING = 0.6
 ABRIDGED = 0.35
 
@@ -242,7 +242,7 @@ def _settings(name: str) -> tuple[NameLayout, ...]:
     texts = [(text, 1.0) for text in _wraps(name)]
     number = re.search(r"\w?\d+$|\b[A-Z]$", name)
     texts += [(number[0], ABRIDGED)] if number else []
-    ways = itertools.product(texts, SIZES, ((False, 1.0), (True, TURNED)))
+    ways = itertools.product(texts, SIZES, ((False, 1.0), (True, TURNED_SHARE)))
     settings = [
         NameLayout(text, size, turned, worth * size * less)
         for (text, worth), size, (turned, less) in ways
@@ -255,7 +255,7 @@ def _wraps(name: str) -> tuple[str, ...]:
     """Return the name in one line, and in the most even two and three lines."""
     words = name.split()
     texts = [name]
-    for lines in range(2, min(MOST_LINES, len(words)) + 1):
+    for lines in range(2, min(MAX_LINES, len(words)) + 1):
         cuts = itertools.combinations(range(1, len(words)), lines - 1)
         wraps = [
             "\n".join(" ".join(words[a:b]) for a, b in itertools.pairwise((0, *cut, len(words))))

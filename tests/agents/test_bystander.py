@@ -10,7 +10,7 @@ from helpers.worlds.hall_with_people import People, hall, two_rooms
 
 from dva_sim.agents.habits import LeavingHabits
 from dva_sim.agents.people import evacuation
-from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen
+from dva_sim.agents.people.bystander import START_GAP_M, BystanderAgent, draw_places, nothing_seen
 from dva_sim.agents.people.evacuation import (
     PERIOD,
     UNTENABLE,
@@ -439,7 +439,7 @@ def test_people_work_in_rooms_not_in_corridors_and_not_on_top_of_each_other():
     assert not any("corridor" in room for room in rooms)
     assert len(rooms) >= 8
     pairs = [(a, b) for i, a in enumerate(taken) for b in taken[:i]]
-    assert min(math.dist(a, b) for a, b in pairs) >= APART
+    assert min(math.dist(a, b) for a, b in pairs) >= START_GAP_M
 
 
 def test_one_more_bystander_changes_nobody_elses_place():

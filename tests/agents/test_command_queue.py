@@ -6,7 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from dva_sim.agents.robot.command_queue import EACH, LIMIT, OTHERS, CommandQueue, Letter, Standing
+from dva_sim.agents.robot.command_queue import (
+    LIMIT,
+    MAX_OF_OTHERS,
+    PER_CONNECTION,
+    CommandQueue,
+    Letter,
+    Standing,
+)
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
@@ -178,7 +185,7 @@ def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog(bench):
     bench.clock.call_at(1.0, bench.ask, b"grant", "d")
     bench.clock.run(2.0)
     assert max(bench.times[b"start"], bench.times[b"grant"]) < 1.0 + 5 * SERVICE
-    assert bench.inbox.longest <= 20 * EACH
+    assert bench.inbox.longest <= 20 * PER_CONNECTION
     assert set(bench.busy) == {EMERGENCY}
 
 
@@ -229,13 +236,13 @@ def test_commands_of_strangers_have_their_turns_among_what_others_ask():
 
 
 def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so(bench):
-    for number in range(EACH + 4):
+    for number in range(PER_CONNECTION + 4):
         bench.ask(b"%d" % number, peer="s")
         bench.ask(b"<SetTeleOp>%d" % number, peer="h")
     assert bench.busy == [b"9", b"10", b"11"]
     assert bench.inbox.overflowed == 3
     bench.clock.run(20.0)
-    assert len(bench.done) == 2 * (EACH + 4) - 3
+    assert len(bench.done) == 2 * (PER_CONNECTION + 4) - 3
 
 
 def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out(bench):
@@ -243,7 +250,7 @@ def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out(bench):
         bench.ask(b"%d" % number, peer=f"s {number}")
     bench.ask(b"grant", peer="d")
     bench.ask(b"start", peer="h")
-    assert len(bench.busy) == 2 * LIMIT - OTHERS
+    assert len(bench.busy) == 2 * LIMIT - MAX_OF_OTHERS
     bench.clock.run(0.16)
     assert bench.done == [b"0", b"start", b"grant"]
 

@@ -5,7 +5,7 @@ from helpers.dva.scripted_dva import OPERATOR, ROBOT, PretendedDva
 
 from dva_sim.agents.robot.command_queue import Letter
 from dva_sim.agents.robot.confirmations import Confirmations
-from dva_sim.agents.robot.controller import PATIENCE, Decision, Limits, RobotController
+from dva_sim.agents.robot.controller import INQUIRY_WAIT_S, Decision, Limits, RobotController
 from dva_sim.protocol import messages as m
 
 
@@ -52,5 +52,5 @@ def test_an_answer_settles_nothing_that_arrived_after_its_question():
         assert confirmations.keep(letter, start)
         controller.inquiry.about_holder(OPERATOR)
         confirmations.ask()
-    dva.run_for(PATIENCE / 2)
+    dva.run_for(INQUIRY_WAIT_S / 2)
     assert concluded == [(early, 1), (late, 2)]

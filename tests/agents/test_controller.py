@@ -4,7 +4,14 @@ import pytest
 from helpers.dva.permissions import confirmation, hear
 from helpers.paths import ROOT
 
-from dva_sim.agents.robot.controller import LEASE_S, STAND, Decision, Limits, Mode, RobotController
+from dva_sim.agents.robot.controller import (
+    LEASE_S,
+    STANDSTILL,
+    Decision,
+    Limits,
+    Mode,
+    RobotController,
+)
 from dva_sim.protocol import messages as m
 
 SPECIFICATION = ROOT / "protocol" / "README.md"
@@ -163,7 +170,7 @@ def test_no_row_on_refusals_goes_untested():
 
 @pytest.mark.invariant("S2")
 def test_a_new_grant_stops_the_robot_and_fences_the_old_holder(driven):
-    assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STAND
+    assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STANDSTILL
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(RUI, m.StartTeleOp(), session=8, moving=True).code == m.BUSY
     assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
@@ -185,7 +192,7 @@ def test_a_grant_that_the_dva_does_not_confirm_changes_nothing(driven, session):
 def test_a_robot_whose_computer_hung_is_stopped_by_its_driver(driven):
     """Its motors may still have the last command, until the watchdog ends that."""
     driven.robot.hang()
-    assert driven.say(ANA, m.StopTeleOp()).set_point == STAND
+    assert driven.say(ANA, m.StopTeleOp()).set_point == STANDSTILL
 
 
 @pytest.mark.invariant("S3")
@@ -205,7 +212,7 @@ def test_a_command_queued_before_an_emergency_does_not_move_a_drive_started_afte
 def test_an_emergency_stops_whoever_sends_it_and_nothing_earlier_moves_it(driven, source):
     driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)
     stop = driven.say(source, m.Emergency(), now=2.0, session=0)
-    assert (stop.code, stop.set_point) == (m.OK, STAND)
+    assert (stop.code, stop.set_point) == (m.OK, STANDSTILL)
     assert driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=2.1).code == m.WRONG_MODE
     driven.release(2.15)
     assert driven.say(ANA, m.StartTeleOp(), now=2.2, arrived=1.9).code == m.STALE
@@ -240,7 +247,7 @@ def test_a_revocation_stops_the_robot_and_its_session_comes_back_only_by_the_dva
     over = m.PermissionRevocation(ROBOT, ANA, 7)
     assert driven.say(ANA, over).code == m.NOT_PERMITTED
     assert driven.robot.owner == ANA
-    assert driven.say(DVA, over).set_point == STAND
+    assert driven.say(DVA, over).set_point == STANDSTILL
     assert driven.robot.mode is Mode.IDLE
     assert driven.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
     driven.confirms = False
@@ -434,7 +441,7 @@ def test_every_mode_answers_every_message_by_the_permission_held(mode, what, lev
     assert decision.code == CODES[code]
     assert bench.robot.mode is LETTERS[after]
     if LETTERS[mode] is not Mode.IDLE and after == "I":
-        assert decision.set_point == STAND  # what ends a motion says so to the motors
+        assert decision.set_point == STANDSTILL  # what ends a motion says so to the motors
     if decision.code != m.OK:
         assert decision.set_point is None
     assert (bench.robot.owner is None) == (after == "I")
@@ -496,7 +503,7 @@ def test_how_a_mission_stands_is_told_to_everybody_who_asks(bench):
 def test_a_mission_that_somebody_ends_has_failed_and_says_why(bench, source, body, reason):
     bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
     bench.say(ANA, m.GoTo((HERE,)))
-    assert bench.say(source, body, now=1.0).set_point == STAND
+    assert bench.say(source, body, now=1.0).set_point == STANDSTILL
     assert mission_state(bench) == ("failed", 1, reason)
 
 
@@ -523,7 +530,7 @@ def test_a_tick_that_the_robots_clock_has_not_reached_is_refused_and_counted(dri
 
 
 def test_a_day_of_sessions_is_no_jump(driven):
-    assert driven.say(DVA, m.PermissionGrant(RUI, "both", DAY)).set_point == STAND
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", DAY)).set_point == STANDSTILL
     assert driven.say(RUI, m.StartTeleOp(), session=DAY).code == m.OK
 
 
@@ -538,7 +545,7 @@ def test_no_forged_session_leaves_a_floor_behind(driven, session):
     hear(driven.robot, confirmation(m.PermissionGrant(ANA, "teleoperation", 7)))
     assert driven.robot.owner == ANA
     driven.confirms = True
-    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 8)).set_point == STAND
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 8)).set_point == STANDSTILL
     assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
 
 
@@ -575,7 +582,7 @@ def test_that_nobody_holds_it_ends_no_drive(driven):
 @pytest.mark.invariant("S2")
 def test_a_forged_revocation_stops_the_driver_who_keeps_the_robot(driven):
     driven.say(ANA, m.StartTeleOp(), number=60)
-    assert driven.say(DVA, m.PermissionRevocation(ROBOT, ANA, 7)).set_point == STAND
+    assert driven.say(DVA, m.PermissionRevocation(ROBOT, ANA, 7)).set_point == STANDSTILL
     assert driven.robot.inquiry.next(0.0) == m.GetGrant()
     assert driven.robot.take_by_hand("somebody", 0.1, moving=False).code == m.BUSY
     hear(driven.robot, confirmation(m.PermissionGrant(ANA, "teleoperation", 7)))

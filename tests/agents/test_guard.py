@@ -12,7 +12,7 @@ from helpers.dva.scripted_dva import GUARD, POST, WALKER, PretendedDva
 
 from dva_sim.agents.habits import GuardWorkHabits
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardProtocol
+from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MAX_ANNOUNCED, GuardProtocol
 from dva_sim.agents.people.profiles import GuardProfile, Walker
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.resources import find
@@ -558,7 +558,7 @@ def test_of_many_announcements_the_newest_32_are_remembered():
     duty = GuardProtocol("02:00:00:00:00:01", 10.0)
     for event in range(1, 1001):
         decide(duty, announcement(event))
-    assert MOST_ANNOUNCED == 32
+    assert MAX_ANNOUNCED == 32
     assert decide(duty, m.TaskAward(968)) == m.UNKNOWN_EVENT
     assert decide(duty, m.TaskAward(969)) == m.OK
 

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from dva_sim.agents.robot.inquiry import BURST, MOST_READERS, RATE, Inquiry
+from dva_sim.agents.robot.inquiry import BURST, MAX_READERS, RATE, Inquiry
 from dva_sim.protocol import messages as m
 
 ANA, RUI = "02:00:00:03:00:01", "02:00:00:03:00:02"
@@ -49,7 +49,7 @@ def test_a_question_may_be_asked_at_the_time_that_was_told_to_the_microsecond(se
 
 def test_readers_and_the_holder_take_turns_and_readers_are_bounded():
     inquiry, asked = Inquiry(), list[m.GetGrant | None]()
-    for number in range(2 * MOST_READERS):
+    for number in range(2 * MAX_READERS):
         inquiry.about_reader(f"02:00:00:0F:00:{number:02X}")
     for _ in range(6):
         inquiry.about_holder(RUI)

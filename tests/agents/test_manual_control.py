@@ -7,9 +7,9 @@ from helpers.dva.permissions import confirmation, give, hear
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import (
+    INQUIRY_WAIT_S,
     LEASE_S,
-    PATIENCE,
-    STAND,
+    STANDSTILL,
     Limits,
     Mode,
     RobotController,
@@ -62,7 +62,7 @@ def test_whoever_has_permission_is_told_that_the_robot_is_busy(in_hand):
         assert decision.code == m.BUSY
         assert "at the robot" in decision.text
     assert in_hand.drive_by_hand(HERE, 0.4, 0.0, 3.0).code == m.OK
-    assert in_hand.let_go(HERE).set_point == STAND
+    assert in_hand.let_go(HERE).set_point == STANDSTILL
     assert say(in_hand, ANA, m.StartTeleOp(), 4.0, 9).code == m.OK
 
 
@@ -81,7 +81,7 @@ def test_a_robot_that_somebody_holds_says_who_and_goes_into_no_hand(robot):
     say(robot, DVA, m.PermissionRevocation(ROBOT, ANA, 7), 2.0, 2)
     assert robot.inquiry.next(2.0) is not None
     assert robot.take_by_hand(HERE, 2.5, moving=False).code == m.BUSY  # the DVA is being asked
-    assert robot.take_by_hand(HERE, 2.0 + PATIENCE, moving=False).code == m.OK
+    assert robot.take_by_hand(HERE, 2.0 + INQUIRY_WAIT_S, moving=False).code == m.OK
 
 
 @pytest.mark.invariant("S2")
@@ -98,7 +98,7 @@ def test_a_robot_that_has_restarted_asks_who_holds_it_before_it_goes_into_a_hand
 @pytest.mark.invariant("S2")
 def test_a_robot_that_has_restarted_without_a_dva_goes_into_a_hand_after_a_while(robot):
     robot.restart(clock_offset=5.0, now=100.0)
-    assert robot.take_by_hand(HERE, 100.0 + PATIENCE, moving=False).code == m.OK
+    assert robot.take_by_hand(HERE, 100.0 + INQUIRY_WAIT_S, moving=False).code == m.OK
 
 
 @pytest.mark.invariant("S2")
@@ -115,7 +115,7 @@ def test_only_a_robot_that_stands_is_taken_and_by_one_hand(robot):
 @pytest.mark.invariant("S3")
 def test_an_emergency_wins_and_the_robot_has_to_be_taken_again(in_hand):
     in_hand.drive_by_hand(HERE, 0.4, 0.0, 1.0)
-    assert say(in_hand, ANA, m.Emergency(), 2.0).set_point == STAND
+    assert say(in_hand, ANA, m.Emergency(), 2.0).set_point == STANDSTILL
     assert in_hand.drive_by_hand(HERE, 0.4, 0.0, 2.1).code == m.WRONG_MODE
     assert in_hand.take_by_hand(HERE, 2.5, moving=False).code == m.BUSY
     assert in_hand.release_by_hand("warden").code == m.OK

@@ -15,7 +15,13 @@ from helpers.worlds.robot_fleet import Fleet, Robot, caparica
 from dva_sim.agents.robot.collision_guard import PERSONAL
 from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.agents.robot.manoeuvres import INSPECT_FOR, LOOK_FROM
-from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, MissionGoal
+from dva_sim.agents.robot.missions import (
+    GIVE_UP_AFTER,
+    MAX_JAMS,
+    REACHED_WITHIN_M,
+    RESERVE,
+    MissionGoal,
+)
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.site import Site
@@ -51,7 +57,7 @@ def test_a_robot_visits_its_waypoints_in_order_and_is_done(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to((13.1, 12.0), (13.1, 20.0)))
     fleet.run(120.0)
     assert robot.end == ("done", "")
-    assert math.dist(robot.here, (13.1, 20.0)) < NEAR + 0.05
+    assert math.dist(robot.here, (13.1, 20.0)) < REACHED_WITHIN_M + 0.05
     assert [step.left for _, step in robot.steps] == [2, 1, 0]
     assert untouched(robot)
 
@@ -63,7 +69,9 @@ def test_a_patrol_goes_round_as_often_as_it_was_told(fleet):
     assert robot.end == ("done", "")
     assert [step.left for _, step in robot.steps] == [2, 1, 2, 1, 2, 1, 0]
     legs = 3.0 + 5 * 3.0
-    assert robot.body.distance == pytest.approx(legs - 6 * 2 * NEAR + NEAR, abs=1.0)
+    assert robot.body.distance == pytest.approx(
+        legs - 6 * 2 * REACHED_WITHIN_M + REACHED_WITHIN_M, abs=1.0
+    )
 
 
 def test_a_patrol_without_a_number_of_laps_does_not_end(fleet):
@@ -253,7 +261,7 @@ def test_a_robot_that_cannot_get_in_has_failed_after_so_many_jams():
     fleet.run(400.0)
     assert robot.end == ("failed", "jammed")
     jammed = [step for _, step in robot.steps if step.reason == "jammed"]
-    assert len(jammed) == MOST_JAMS + 1 == 4
+    assert len(jammed) == MAX_JAMS + 1 == 4
 
 
 def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home():

@@ -4,7 +4,7 @@ import pytest
 from helpers.dva.scripted_dva import OPERATOR, ROBOT, PretendedDva, driving
 
 from dva_sim.agents.device import STATUS
-from dva_sim.agents.robot.command_queue import EACH
+from dva_sim.agents.robot.command_queue import PER_CONNECTION
 from dva_sim.agents.robot.inquiry import BURST, RATE
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
@@ -60,12 +60,12 @@ def test_what_is_no_message_is_answered_and_stops_nothing(dva, robot):
 @pytest.mark.invariant("S11")
 def test_for_whom_there_is_no_room_is_told_so_at_once(dva, robot):
     answers = Answers(robot)
-    for _ in range(EACH + 3):
+    for _ in range(PER_CONNECTION + 3):
         answers.ask(m.GetSensorInfo())
     dva.run_for(0.001)
     assert answers.codes == [m.BUSY, m.BUSY]  # one is worked on already
     dva.run_for(5.0)
-    assert answers.codes[2:] == [m.OK] * (EACH + 1)
+    assert answers.codes[2:] == [m.OK] * (PER_CONNECTION + 1)
 
 
 @pytest.mark.parametrize(

@@ -18,14 +18,14 @@ from dva_sim.agents.observation import Cameras
 from dva_sim.cameras import service as cameras
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
-from dva_sim.cameras.streams import MOST_VIEWERS
+from dva_sim.cameras.streams import MAX_VIEWERS
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.parts import WorldPart
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.options.runs import LiveOptions
 from dva_sim.protocol import messages as m
-from dva_sim.serving.pipes import MOST_WAITING
+from dva_sim.serving.pipes import MAX_WAITING
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import build, load
 
@@ -177,7 +177,7 @@ def test_a_page_of_another_site_sees_no_pictures(world, headers, status):
 
 
 def test_more_viewers_than_there_is_room_for_are_refused(world):
-    viewers = [socket.create_connection(("127.0.0.1", world.port)) for _ in range(MOST_VIEWERS)]
+    viewers = [socket.create_connection(("127.0.0.1", world.port)) for _ in range(MAX_VIEWERS)]
 
     def look() -> None:
         for viewer in viewers:
@@ -189,7 +189,7 @@ def test_more_viewers_than_there_is_room_for_are_refused(world):
     try:
         world.let(look)
         status, data = world.asked("/camera/robot-1.mjpg")
-        assert (status, unnamed(data.decode(), MOST_VIEWERS)) == (503, [])
+        assert (status, unnamed(data.decode(), MAX_VIEWERS)) == (503, [])
     finally:
         for viewer in viewers:
             viewer.close()
@@ -206,7 +206,7 @@ def test_the_world_waits_for_nobody_who_draws(world):
         world.service._screens.watch({ROBOT})
         for _ in range(5000):
             world.service._look()
-        assert len(pipe.outbox) <= MOST_WAITING
+        assert len(pipe.outbox) <= MAX_WAITING
         ticks = list[float]()
         world.clock.every(0.02, lambda: ticks.append(world.clock.now))
         world.until(lambda: len(ticks) > 20)

@@ -104,7 +104,7 @@ def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(tmp_path, monkey
         while True:
             time.thread_time()
 
-    monkeypatch.setattr(module, "MOST_S", 0.02)
+    monkeypatch.setattr(module, "MAX_TRIAL_S", 0.02)
     monkeypatch.setattr(module, "_SHORT_S", 0.02)
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=1, probe=never)
     assert (plan.tried, plan.is_least) == (1, True)

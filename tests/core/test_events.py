@@ -21,7 +21,7 @@ from dva_sim.core.event_status import status_of
 from dva_sim.core.events import (
     KEPT_CLOSED,
     LOOKING,
-    MOST_SOURCES,
+    MAX_SOURCES,
     TRANSITIONS,
     Cause,
     Event,
@@ -102,7 +102,7 @@ def test_an_event_is_as_severe_as_the_worst_report(office):
 def test_of_one_event_at_most_64_sources_are_told_apart():
     events = EventTable()
     event = events.add("fire", HERE, 0.5, 0.0)
-    for number in range(MOST_SOURCES + 10):
+    for number in range(MAX_SOURCES + 10):
         events.note_source(event, str(number), 0.5)
     assert len(event.sources) == 64
 
@@ -111,7 +111,7 @@ def test_of_one_event_at_most_64_sources_are_told_apart():
 def test_when_the_event_table_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
     office, monkeypatch
 ):
-    monkeypatch.setattr(events, "MOST_OPEN", 1)
+    monkeypatch.setattr(events, "MAX_OPEN", 1)
     office.fire(12)
     new = m.EventReport(None, "fire", east(90), 0.5, 0.9, "detected")
     assert office.say(DETECTOR, new)[0].code == m.BUSY

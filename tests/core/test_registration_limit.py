@@ -2,7 +2,7 @@
 
 import pytest
 
-from dva_sim.core.registry import BURST, MOST_PEERS, RATE, RegistrationLimit
+from dva_sim.core.registry import BURST, MAX_PEERS, RATE, RegistrationLimit
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_memory_is_bounded_and_the_peer_quiet_for_longest_is_forgotten():
     for peer in ("first", "second"):
         while limit.takes(peer, 1.0):
             pass
-    for number in range(MOST_PEERS - 1):
+    for number in range(MAX_PEERS - 1):
         limit.takes(str(number), 1.0)
     assert not limit.takes("second", 1.0)
     assert limit.takes("first", 1.0)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dva_sim.core.request_log import (
     KEPT_FOR,
-    MOST_LOGGED,
+    MAX_LOGGED,
     KeptRequest,
     KeptRequests,
     without_sessions,
@@ -45,7 +45,7 @@ def test_requests_are_wanted_for_60_s_after_each_question():
 
 
 def test_the_newest_256_are_kept_and_missing_numbers_tell_what_is_lost():
-    log = filled(MOST_LOGGED + 4)
+    log = filled(MAX_LOGGED + 4)
     assert numbers(log, 0)[0] == 5
     assert log.newest == 260
 

@@ -17,7 +17,7 @@ from dva_sim.core import events
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
 from dva_sim.core.reports import NO_NEWS, REACH
-from dva_sim.core.sensing import IN_A_ROW, RENEW, Sensing, SensorAlarm
+from dva_sim.core.sensing import RENEW, VALUES_IN_A_ROW, Sensing, SensorAlarm
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
@@ -26,7 +26,7 @@ from dva_sim.protocol.schema import MAX_BYTES
 ALARMS = {"smoke": SensorAlarm("fire", 0.3), "gas": SensorAlarm("gas_leak", 0.002)}
 CARRIED = m.SensorInfo("http://robot/camera", (m.Sensor("smoke", "1/m"), m.Sensor("water", "m")))
 ASK = Send(ROBOT, m.GetSensorInfo())
-SMOKY = (0.5,) * IN_A_ROW
+SMOKY = (0.5,) * VALUES_IN_A_ROW
 
 
 @pytest.fixture
@@ -179,7 +179,7 @@ def test_what_a_sensor_goes_on_showing_is_said_once(office):
 
 def test_gas_is_a_leak_and_another_event_than_smoke(office):
     office.shows(ROBOT, "smoke", *SMOKY)
-    office.shows(ROBOT, "gas", *(0.01,) * IN_A_ROW)
+    office.shows(ROBOT, "gas", *(0.01,) * VALUES_IN_A_ROW)
     assert [event.kind for event in office.core.events.open.values()] == ["fire", "gas_leak"]
 
 
@@ -281,6 +281,6 @@ def test_smoke_at_a_robot_whose_place_is_not_known_means_nothing(office):
 
 
 def test_when_no_more_events_fit_that_is_counted(office, monkeypatch):
-    monkeypatch.setattr(events, "MOST_OPEN", 0)
+    monkeypatch.setattr(events, "MAX_OPEN", 0)
     assert office.shows(ROBOT, "smoke", *SMOKY) == []
     assert office.core.refused == 1

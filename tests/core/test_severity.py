@@ -12,7 +12,7 @@ from helpers.dva.dispatch_office import (
 )
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.sensing import IN_A_ROW, Sensing, SensorAlarm
+from dva_sim.core.sensing import VALUES_IN_A_ROW, Sensing, SensorAlarm
 from dva_sim.protocol import messages as m
 
 THIRD_DETECTOR = "02:00:00:04:00:03"
@@ -71,7 +71,7 @@ def test_three_devices_that_report_it_make_it_high():
 def test_a_robots_sensor_counts_once_it_has_stood_above_its_alarm_level_for_some_values():
     office = office_of()
     report(office, 0.1)
-    for number in range(IN_A_ROW):
+    for number in range(VALUES_IN_A_ROW):
         assert office.event(1).severity == 0.1
         office.shows(ROBOT, "smoke", 3.2 * ALARM, now=2.0 + number)
     assert office.event(1).severity == pytest.approx(0.8)
@@ -118,7 +118,7 @@ def test_severity_is_the_highest_reported_where_it_does_not_move():
     report(office, 0.1)
     report(office, 0.2, OTHER_DETECTOR)
     report(office, 0.15, THIRD_DETECTOR)
-    for number in range(IN_A_ROW):
+    for number in range(VALUES_IN_A_ROW):
         office.shows(ROBOT, "smoke", 5 * ALARM, now=2.0 + number)
     office.finds(office.event(1).holder or GUARD, "confirmed", 9.0)
     assert office.event(1).severity == 0.2

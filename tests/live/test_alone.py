@@ -18,7 +18,7 @@ pytestmark = pytest.mark.system
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch):
-    monkeypatch.setattr(process, "PATIENCE", 0.2)
+    monkeypatch.setattr(process, "DVA_WAIT_S", 0.2)
     monkeypatch.setattr(process, "LAST_WORDS", 0.0)
 
 

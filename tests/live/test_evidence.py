@@ -389,7 +389,7 @@ def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path):
 
 
 def test_a_run_that_has_grown_too_large_is_kept_up_to_there(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "MOST_BYTES", 30_000)
+    monkeypatch.setattr(recording, "MAX_BYTES", 30_000)
     lost = record(tmp_path / "run.mcap", lines=1000).finish()
     assert unnamed(lost, "run.mcap", " s only", "0 MB") == []
     assert check_recording(tmp_path / "run.mcap")[0] == []

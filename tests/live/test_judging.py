@@ -11,7 +11,7 @@ import pytest
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import Sent
-from dva_sim.live.judging import FRAME, HERE, SEEN, SENT_LINE, LiveJudge
+from dva_sim.live.judging import FRAME, OWN_SIDE, SEEN, SENT_LINE, LiveJudge
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.simulation import scenario as scenarios
@@ -70,7 +70,7 @@ def lines_by_part(run: Run) -> dict[int, list[Line]]:
     lines: dict[int, list[Line]] = defaultdict(list)
     for device in run.stage.devices:
         part = part_of(Sent(0.0, device.id_tag, "", 0, b""))
-        lines[part].append([HERE, 0.0, [device.id_tag]])
+        lines[part].append([OWN_SIDE, 0.0, [device.id_tag]])
     for fact in run.recorder.facts or ():
         lines[part_of(fact)].append(line_of(fact))
     return lines
@@ -253,7 +253,7 @@ def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(is
         facts[:0] = [grant, answer]
     judge = LiveJudge(terms_of(scenario))
     judge.joins(0)
-    here = [HERE, 0.0, [DVA, ROBOT, PHONE, OTHER]]
+    here = [OWN_SIDE, 0.0, [DVA, ROBOT, PHONE, OTHER]]
     judge.hear(0, [json.dumps(line).encode() for line in (here, *map(line_of, facts))])
     states = {verdict.rule: verdict.state for verdict in judge.verdicts()}
     assert states["S5"] == ("broken" if is_forged else "held")

@@ -21,7 +21,7 @@ def test_an_output_that_nobody_reads_stops_nobody(monkeypatch):
     monkeypatch.setattr(ros_robot, "LAST_LINES", 0.01)
     goes_on = threading.Event()
     lines = LineWriter(lambda _: goes_on.wait(PATIENCE_S))
-    for number in range(2 * ros_robot.MOST_WAITING):
+    for number in range(2 * ros_robot.MAX_WAITING):
         lines(str(number))
     lines.close()
     goes_on.set()

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from dva_sim.network import realtime
-from dva_sim.network.realtime import MOST_BEHIND, LiveClock, PacedClock
+from dva_sim.network.realtime import MAX_BEHIND, LiveClock, PacedClock
 
 pytestmark = pytest.mark.system
 
@@ -93,7 +93,7 @@ def test_a_callback_that_takes_long_is_told_of_before_what_is_late_because_of_it
 
 def test_what_cannot_be_made_up_for_is_given_up_and_nothing_is_left_out():
     clock, happened = PacedClock(), []
-    clock.call_at(0.01, time.sleep, MOST_BEHIND + 0.5)
+    clock.call_at(0.01, time.sleep, MAX_BEHIND + 0.5)
     clock.every(0.1, lambda: happened.append(round(clock.now, 3)))
     took = passed(clock, 2.0)
     assert clock.given_up > 0.3

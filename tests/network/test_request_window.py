@@ -4,7 +4,7 @@ import heapq
 
 import pytest
 
-from dva_sim.network.request_window import MOST, RequestWindow
+from dva_sim.network.request_window import MAX_UNANSWERED, RequestWindow
 
 
 def played(*, round_trip, service=0.0, rate_hz=10.0, lasts=60.0, slower_from=None):
@@ -48,7 +48,7 @@ def test_where_nothing_queues_all_wanted_requests_go(round_trip):
     needed = round_trip * 10.0
     assert min(after(sizes, 20.0)) >= needed
     assert max(waits) == 0.0
-    assert max(size for _, size in sizes) <= MOST
+    assert max(size for _, size in sizes) <= MAX_UNANSWERED
 
 
 @pytest.mark.parametrize("service", [0.2, 0.3, 1.0])
@@ -78,4 +78,4 @@ def test_answers_that_all_come_at_once_are_taken_in():
         numbers = [window.sent() for _ in range(4)]
         for number in numbers:
             window.answered(number, 1.0, 1.0)
-    assert 1 <= window.size <= MOST
+    assert 1 <= window.size <= MAX_UNANSWERED

@@ -174,7 +174,7 @@ def test_a_wrong_server_key_is_told_at_both_ends(ring, other_ring, make, binds, 
     assert ROBOT in at_server
     assert ROBOT in at_client
     assert not client.refusals[0].gave_up
-    assert server.security.refused[ROBOT, Reason.WRONG_SERVER_KEY] >= module.PATIENCE
+    assert server.security.refused[ROBOT, Reason.WRONG_SERVER_KEY] >= module.MAX_HANGUPS
 
 
 @each_pair
@@ -262,7 +262,7 @@ def test_one_hang_up_is_kept_for_the_time_out_but_not_told(ring, other_ring, mak
     server, client = make(ring, ROBOT), make(other_ring, OPERATOR)
     open_both(server, client, zmq.ROUTER, zmq.REQ)
     run([server, client], lambda: client.security.trouble(OPERATOR, ROBOT))
-    assert client.security.refused.total() < module.PATIENCE
+    assert client.security.refused.total() < module.MAX_HANGUPS
     assert client.refusals == []
 
 

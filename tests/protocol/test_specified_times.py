@@ -36,7 +36,7 @@ def passage(opening):
         ("age limit of a command |", FULL.robot.max_age_s),
         ("drive without a valid command |", controller.LEASE_S),
         ("`DevSub` | ends", sensors.LEASE),
-        ("`StartTeleOp` or a mission", controller.PATIENCE),
+        ("`StartTeleOp` or a mission", controller.INQUIRY_WAIT_S),
         ("`STALE`", refusals.LATE_FOR),
         ("The asker repeats", handovers.ANSWER_WITHIN),
         ("The asker repeats", handovers.DECLINED_FOR),

@@ -4,7 +4,7 @@ import os
 import socket
 
 from dva_sim.serving import pipes
-from dva_sim.serving.pipes import MOST_WAITING, LineKinds, LineOutbox, LinePipe, PipeEnd, WatchedEnd
+from dva_sim.serving.pipes import MAX_WAITING, LineKinds, LineOutbox, LinePipe, PipeEnd, WatchedEnd
 
 KINDS = LineKinds(newest=frozenset({"pos", "seat", "hazards"}), kept=frozenset({"scene", "done"}))
 
@@ -26,13 +26,13 @@ def test_of_some_kinds_only_the_newest_waits():
 def test_a_full_outbox_loses_the_oldest_that_may_be_lost_and_counts_it():
     outbox = LineOutbox(KINDS)
     outbox.put({"k": "scene"})
-    for number in range(MOST_WAITING + 20):
+    for number in range(MAX_WAITING + 20):
         outbox.put({"k": "story", "n": number})
         outbox.put({"k": "done", "id": number}) if number < 5 else None
     reports = [json.loads(outbox.next()) for _ in range(len(outbox))]
     assert reports[0] == {"k": "scene"}
     assert [line["id"] for line in reports if line["k"] == "done"] == [0, 1, 2, 3, 4]
-    assert [line["n"] for line in reports if line["k"] == "story"][-1] == MOST_WAITING + 19
+    assert [line["n"] for line in reports if line["k"] == "story"][-1] == MAX_WAITING + 19
     assert outbox.dropped > 20
 
 
@@ -65,7 +65,7 @@ def test_what_is_no_line_is_left_out():
 
 
 def test_a_line_that_does_not_end_ends_the_pipe(monkeypatch):
-    monkeypatch.setattr(pipes, "MOST_LINE", 1000)
+    monkeypatch.setattr(pipes, "MAX_LINE", 1000)
     ours, theirs = socket.socketpair()
     pipe = LinePipe(ours.detach(), KINDS)
     theirs.sendall(b'{"do":1}\n' + b"x" * 900)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from helpers.mistakes import check_mistake, each_mistake, mistakes
 
-from dva_sim.serving.users import MOST_BYTES, UserFile, is_password_of
+from dva_sim.serving.users import MAX_BYTES, UserFile, is_password_of
 
 PASSWORD = "correct horse"
 
@@ -76,7 +76,7 @@ MISTAKES = [
         (entries(ENTRY | {"more": 1}), "entry"),
         (entries(ENTRY | {"password": None}), "entry password"),
         (entries(ENTRY, ENTRY), "two same name"),
-        (" " * (MOST_BYTES + 1), "too long"),
+        (" " * (MAX_BYTES + 1), "too long"),
     ),
     *mistakes(
         add,

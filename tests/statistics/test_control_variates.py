@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dva_sim.statistics import adjusted, band, off_zero
-from dva_sim.statistics.control_variates import FEWEST_EACH
+from dva_sim.statistics.control_variates import MIN_EACH
 
 
 def persons(n, seed=1):
@@ -50,9 +50,9 @@ def test_a_covariate_of_nothing_makes_intervals_hardly_longer():
 
 
 def test_with_too_few_persons_nothing_is_learned():
-    values, known = persons(2 * FEWEST_EACH - 1)
+    values, known = persons(2 * MIN_EACH - 1)
     assert np.array_equal(adjusted(values, known), values)
-    values, known = persons(2 * FEWEST_EACH)
+    values, known = persons(2 * MIN_EACH)
     assert not np.array_equal(adjusted(values, known), values)
 
 

@@ -15,7 +15,13 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation.full.observations import Right
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.full.takeovers import Takeovers
-from dva_sim.storms.checkers import ANSWERED_WITHIN, MOST, AnswerWatch, RefusedDrivers, oversized
+from dva_sim.storms.checkers import (
+    ANSWERED_WITHIN,
+    MAX_BREACHES,
+    AnswerWatch,
+    RefusedDrivers,
+    oversized,
+)
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.plan import StormPlan
 from dva_sim.storms.storm import Storm, play
@@ -126,7 +132,9 @@ class Hoard:
 Hoard.__module__ = "dva_sim.made_up"
 
 
-@pytest.mark.parametrize(("many", "found"), [(MOST, []), (MOST + 1, ["Hoard.kept[]"])])
+@pytest.mark.parametrize(
+    ("many", "found"), [(MAX_BREACHES, []), (MAX_BREACHES + 1, ["Hoard.kept[]"])]
+)
 def test_a_container_beyond_its_bound_is_found(many, found):
     assert [name for name, *_ in oversized([Hoard(many)])] == found
 

@@ -12,7 +12,7 @@ import pytest
 from helpers.dva.permissions import enter
 
 from dva_sim.agents.device import MISSION, command_topic, do_nothing
-from dva_sim.agents.robot.command_queue import EACH
+from dva_sim.agents.robot.command_queue import PER_CONNECTION
 from dva_sim.agents.robot.robot import FRAME, RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.kernel.recorder import Accepted
@@ -500,7 +500,7 @@ def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy():
         service(Request(data, lambda reply: reported.append(decode(reply).body), peer="one"))
     driven.clock.run(driven.clock.now + 5.0)
     codes = Counter(reply.code for reply in reported if isinstance(reply, m.Reply))
-    assert codes[m.OK] in (EACH, EACH + 1)
+    assert codes[m.OK] in (PER_CONNECTION, PER_CONNECTION + 1)
     assert codes[m.BUSY] == Nuisances.UNANSWERED + 1
     counted = driven.run.recorder.counters
     busy, unread = (

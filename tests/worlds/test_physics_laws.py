@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dva_sim.agents.robot.profile import load_robot
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.team import WET_GRIP
-from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec
+from dva_sim.worlds.drives import MAX_TICK, DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
 
@@ -218,7 +218,7 @@ def body_of(size, box, speed):
     return DriveSpec(
         radius=around,
         corners=corners if box else (),
-        max_speed=speed * bare.safe_speed(LONGEST_TICK),
+        max_speed=speed * bare.safe_speed(MAX_TICK),
         max_acceleration=7.0,
         max_deceleration=7.0,
     )
@@ -239,7 +239,7 @@ def test_no_body_leaves_a_room_of_thin_walls_at_any_speed_that_it_may_have(
     turn = np.linspace(0, 2 * math.pi, len(corners), endpoint=False)
     x, y = 7 + corners * np.cos(turn), 7 + corners * np.sin(turn)
     walls = [*zip(x, y, np.roll(x, -1), np.roll(y, -1), strict=True)]
-    world = World(hall(14.0, 14.0, walls), LONGEST_TICK)
+    world = World(hall(14.0, 14.0, walls), MAX_TICK)
     robot = world.add_robot("robot-1", body_of(size, box, share), Pose(7.0, 7.0, heading))
     robot.body.velocity = (
         robot.spec.max_speed * math.cos(heading),
@@ -257,7 +257,7 @@ def test_the_end_of_a_single_thin_wall_stops_what_runs_into_it(angle, box):
     spec = body_of(0.1, box, 1.0)
     heading = math.radians(angle)
     world = World(hall(8.0, 8.0, [(4.0, 4.0, 4.0 + 0.5 * math.cos(heading),
-                                   4.0 + 0.5 * math.sin(heading))]), LONGEST_TICK)  # fmt: skip
+                                   4.0 + 0.5 * math.sin(heading))]), MAX_TICK)  # fmt: skip
     start = Pose(4 - 1.5 * math.cos(heading), 4 - 1.5 * math.sin(heading), heading)
     robot = world.add_robot("robot-1", spec, start)
     robot.body.velocity = (
@@ -273,7 +273,7 @@ def test_the_end_of_a_single_thin_wall_stops_what_runs_into_it(angle, box):
 def test_a_light_robot_is_not_pressed_through_a_wall_by_a_heavy_one():
     light = load_robot("pibot").drive_spec()
     for offset in (0.0, 0.05, 0.15):
-        world = World(hall(10.0, 10.0, [(6.0, 0.0, 6.0, 10.0)]), LONGEST_TICK)
+        world = World(hall(10.0, 10.0, [(6.0, 0.0, 6.0, 10.0)]), MAX_TICK)
         car = world.add_robot("pibot-1", light, Pose(5.5, 5.0, 0.3))
         heavy = world.add_robot("robot-1", SPEC, Pose(4.8, 5.0 + offset, 0.0))
         heavy.drive(0.5, 0.0, math.inf)
@@ -282,7 +282,7 @@ def test_a_light_robot_is_not_pressed_through_a_wall_by_a_heavy_one():
 
 
 def test_a_crowd_that_drives_into_a_corner_stays_in_the_room():
-    world = World(hall(6.0, 6.0), LONGEST_TICK)
+    world = World(hall(6.0, 6.0), MAX_TICK)
     for number in range(25):
         at = Pose(0.6 + 0.9 * (number % 5), 0.6 + 0.9 * (number // 5), -2.4 + 0.01 * number)
         world.add_robot(f"robot-{number}", SPEC, at).drive(0.5, 0.0, math.inf)
@@ -292,4 +292,4 @@ def test_a_crowd_that_drives_into_a_corner_stays_in_the_room():
 
 
 def test_runs_use_no_longer_tick_than_profiles_are_made_for():
-    assert PHYSICS_TICK <= LONGEST_TICK
+    assert PHYSICS_TICK <= MAX_TICK

@@ -14,7 +14,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 REFRESH = 10.0  # design: from one look at the whole list to the next, as news may be lost [s]
-MOST_CLOSED = 200  # design: events that are over and still known
+MAX_CLOSED = 200  # design: events that are over and still known
 
 
 class ControlRoomAgent:
@@ -159,10 +159,10 @@ class ControlRoomAgent:
         self.on_event(status)
 
     def _forget_the_oldest(self) -> None:
-        if len(self.events) <= MOST_CLOSED:
+        if len(self.events) <= MAX_CLOSED:
             return
         closed = [n for n, status in self.events.items() if status.closed_for is not None]
-        for number in sorted(closed)[:-MOST_CLOSED]:
+        for number in sorted(closed)[:-MAX_CLOSED]:
             del self.events[number], self.received_at[number], self.histories[number]
 
     def _on_request(self, message: m.Message) -> m.Reply:

@@ -18,7 +18,7 @@ from dva_sim.protocol import messages as m
 
 FREE = "free"  # what the DVA says of a candidate that can be sent
 KINDS = {"Robot": "robot", "Guard": "guard"}
-MOST_TRIES = 3  # design: of one decision, when others decide meanwhile
+MAX_TRIES = 3  # design: of one decision, when others decide meanwhile
 
 
 @dataclass
@@ -72,7 +72,7 @@ class ScriptedDispatcher:
     @staticmethod
     def _wants_something(status: m.EventStatus, turned: Turned) -> bool:
         """Return True for a new event, or one about which the policy asks what is undecided yet."""
-        if status.closed_for is not None or turned.tries >= MOST_TRIES:
+        if status.closed_for is not None or turned.tries >= MAX_TRIES:
             return False
         return not turned.looks or status.proposed is not None
 

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from dva_sim.protocol import messages as m
 
-MOST_STEPS: Final = 60  # design: of one event; of more the oldest but the report are lost
+MAX_STEPS: Final = 60  # design: of one event; of more the oldest but the report are lost
 SAME_STEP: Final = 2.0  # design: a state and the decision that led to it are told within this [s]
 LED_BY: Final = {
     "assign": "assigned",
@@ -83,5 +83,5 @@ class EventHistory:
 
     def _add(self, step: EventStep) -> None:
         self.steps = sorted([*self.steps, step], key=lambda each: each.time)
-        if len(self.steps) > MOST_STEPS:
+        if len(self.steps) > MAX_STEPS:
             del self.steps[1]

@@ -26,11 +26,11 @@ from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
 STILL_WANTED = 0.3  # design: what was wanted no longer ago holds when a drive begins [s]
-MOST_INPUTS = 4096  # design: that are remembered until they act
+MAX_INPUTS = 4096  # design: that are remembered until they act
 GRANT_WITHIN = 5.0  # design: the DVA's grant may be on its way to the robot for so long [s]
-MOST_PICTURES = 1024  # design: whose ticks are remembered until they are drawn
+MAX_PICTURES = 1024  # design: whose ticks are remembered until they are drawn
 LOST_AFTER = 9.0  # design: without a word of the robot: three times its watchdog [s]
-ENOUGH = 3  # design: status messages in a row, which may be older than the start of a drive
+STALE_STATUSES = 3  # design: status messages in a row, which may be older than the start of a drive
 
 
 class HeldRobot:
@@ -95,7 +95,7 @@ class HeldRobot:
         self.app = tilt()
         self.level = "teleoperation"
         self._wished = self.last
-        self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
+        self._inputs: deque[Input] = deque(maxlen=MAX_INPUTS)
         self.missions: HeldMissions | None = None
         self.offered: tuple[m.Sensor, ...] = ()
         self._sender: CommandSender | None = None
@@ -229,7 +229,7 @@ class HeldRobot:
             self._tick = message.body.tick
             denies = self.phase == "driving" and message.body.mode != "Teleoperation"
             self._idle = self._idle + 1 if denies else 0
-            if self._idle == ENOUGH:
+            if self._idle == STALE_STATUSES:
                 self._refused("the robot has ended the drive: it obeys again after a start")
 
     @property
@@ -287,7 +287,7 @@ class HeldRobot:
         self.frame = frame
         self.arrived = now
         self._ticks[round(1000 * frame.captured)] = frame.observation.tick
-        if len(self._ticks) > MOST_PICTURES:
+        if len(self._ticks) > MAX_PICTURES:
             del self._ticks[next(iter(self._ticks))]
         if self.log is not None and self.log.ended is None:
             self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))

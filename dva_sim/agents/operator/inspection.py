@@ -25,7 +25,7 @@ from dva_sim.agents.observation import CLEAR, SEEN_THROUGH, Observation, SeenHaz
 from dva_sim.agents.population import Person
 from dva_sim.worlds.planning import Planner
 
-STILL = 1.0 / 3.0  # source: Nuthmann 2017: a still picture is worth one fixation [s]
+FIXATION_S = 1.0 / 3.0  # source: Nuthmann 2017: a still picture is worth one fixation [s]
 
 
 def clearness(angle: float, half_seen: float) -> float:
@@ -43,7 +43,7 @@ def worth(gap: float) -> float:
 
     So evidence comes as fast as fresh pictures do, up to three a second.
     """
-    return min(gap, STILL)
+    return min(gap, FIXATION_S)
 
 
 class WeighedEvidence:

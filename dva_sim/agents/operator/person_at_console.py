@@ -18,9 +18,9 @@ from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.protocol import messages as m
 
-MOST_ROBOTS = 2  # design: that one person drives by the same input
+MAX_ROBOTS = 2  # design: that one person drives by the same input
 DECLINED_AFTER = 30.0  # design: an order that none of the people at open pages takes [s]
-THERE = 3.0  # design: so near the place of an event a robot has arrived [m]
+ARRIVED_WITHIN_M = 3.0  # design: so near the place of an event a robot has arrived [m]
 
 
 class PersonAgent:
@@ -93,8 +93,8 @@ class PersonAgent:
     ) -> None:
         """Ask for robots, with one level of permission: all of them, or none is kept."""
         free = [robot for robot in robots if robot not in self.robots]
-        if len(self.robots) + len(free) > MOST_ROBOTS:
-            on_result(False, f"one person drives {MOST_ROBOTS} robots at most")
+        if len(self.robots) + len(free) > MAX_ROBOTS:
+            on_result(False, f"one person drives {MAX_ROBOTS} robots at most")
             return
         if not free:
             on_result(True, "they are yours already")
@@ -278,7 +278,7 @@ class PersonAgent:
         if order is None or self._arrived or not (held.event and held.phase == "driving"):
             return
         goal = self.device.frame.to_xy(order.position.latitude, order.position.longitude)
-        if math.dist((seen.x, seen.y), goal) < THERE:
+        if math.dist((seen.x, seen.y), goal) < ARRIVED_WITHIN_M:
             self._arrived = True
             self.device.progress(order.event_id, "arrived")
 

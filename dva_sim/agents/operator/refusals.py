@@ -13,11 +13,12 @@ from dva_sim.protocol import messages as m
 
 ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
 PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
-LATE_FOR = 10.0  # design: if nothing else has come for so long, and `ENOUGH` such, none will [s]
+LATE_FOR = 10.0
+"""Design: if nothing else has come for so long, and `REFUSALS_IN_A_ROW` of these, none will [s]."""
 SAYS_LATE_FOR = 40.0
 """Design: the same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is
 only slow ends the drive itself by then, when it has obeyed nothing for 30 s."""
-ENOUGH = 3  # design: answers in a row of any other kind, as of sends without an answer
+REFUSALS_IN_A_ROW = 3  # design: answers in a row of any other kind, as of sends without an answer
 TAKEN = "somebody else holds the robot"
 
 
@@ -57,7 +58,7 @@ class Refusals:
         if code in PASSES:
             return self._too_late(code, now, LATE_FOR)
         self._in_vain += 1
-        if code not in m.OBEYS_NO_MORE and self._in_vain < ENOUGH:
+        if code not in m.OBEYS_NO_MORE and self._in_vain < REFUSALS_IN_A_ROW:
             return ""
         return self._over(code)
 
@@ -89,7 +90,7 @@ class Refusals:
             self.codes[code] += bool(why)
             return why
         self._doubtful += 1
-        if not self._confirmed and self._doubtful < ENOUGH:
+        if not self._confirmed and self._doubtful < REFUSALS_IN_A_ROW:
             return ""
         self.codes[code if ours else m.NOT_PERMITTED] += 1
         return self._over(code) if ours else self._over(m.NOT_PERMITTED, TAKEN if holder else "")
@@ -99,7 +100,7 @@ class Refusals:
         if self._late == 0:
             self._late_since = now
         self._late += 1
-        since = now - self._late_since if self._late >= ENOUGH else 0.0
+        since = now - self._late_since if self._late >= REFUSALS_IN_A_ROW else 0.0
         self.late = since >= LATE_FOR
         return self._over(code, f"{m.CODE_NAMES[code]} for {limit:g} s") if since >= limit else ""
 

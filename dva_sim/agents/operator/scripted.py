@@ -183,7 +183,7 @@ COMMANDS_AGAIN = 10  # design: of the second drive
 GIVE_BACK_AGAIN = 2.0  # design: while the DVA cannot keep that [s]
 STANDSTILL = 2.0  # design: after it a robot certainly stands [s]
 TRIES = 20  # design: to start
-AGAIN = 0.5  # design: before asking once more for what is not there yet [s]
+RETRY_DELAY_S = 0.5  # design: before asking once more for what is not there yet [s]
 
 
 def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str, int]]:
@@ -196,13 +196,13 @@ def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str,
             reply = yield Ask(dva, m.PermissionRequest(robot, "teleoperation"))
             if reply is not None and isinstance(reply.content, m.Permission):
                 return robot, reply.content.session
-        yield Pause(AGAIN)
+        yield Pause(RETRY_DELAY_S)
 
 
 def _start(robot: str, session: int) -> Generator[Ask | Pause, m.Reply | None, bool]:
     """Start; the grant may reach the robot a little later than the permission reached us."""
     for _ in range(TRIES):
-        yield Pause(AGAIN)
+        yield Pause(RETRY_DELAY_S)
         reply = yield Ask(robot, m.StartTeleOp(), session)
         if reply is not None and reply.code == m.OK:
             return True

@@ -41,7 +41,7 @@ WALKING = "walking"
 ALARMED = "alarmed"
 EVACUATING = "evacuating"
 SAFE = "safe"
-DOWN = "incapacitated"
+INCAPACITATED = "incapacitated"
 
 NOTICED: Final = Conditions(
     temperature=40.0,
@@ -152,7 +152,7 @@ class BystanderAgent(OnFoot):
 
     def _leave_at(self, time: float) -> None:
         """Set out to leave at `time` [s], if not sooner."""
-        if self.activity in (EVACUATING, SAFE, DOWN) or time >= self.leaves_at:
+        if self.activity in (EVACUATING, SAFE, INCAPACITATED) or time >= self.leaves_at:
             return
         if self.activity != ALARMED:
             self.walking.stop()
@@ -184,7 +184,7 @@ class BystanderAgent(OnFoot):
     def _collapse(self) -> None:
         self.exposure.end()
         self._way_out.end()
-        self.activity = DOWN
+        self.activity = INCAPACITATED
         self._tell("is incapacitated")
 
     # --- the way out -------------------------------------------------------------------
@@ -204,7 +204,7 @@ class BystanderAgent(OnFoot):
 
 
 ELBOW_ROOM: Final = 0.3  # design: radius that must fit where somebody works [m]
-APART: Final = 0.8  # design: nobody begins nearer to somebody else [m]
+START_GAP_M: Final = 0.8  # design: nobody begins nearer to somebody else [m]
 PASSAGE: Final = 3.5  # design: a room so many times as long as wide is a corridor
 TRIES: Final = 100  # design: to find a place
 
@@ -226,7 +226,7 @@ def draw_places(
     rooms, areas = _workrooms(site)
     for _ in range(TRIES):
         first = _draw(site, rng, rooms, areas)
-        if all(math.dist(first, other) >= APART for other in taken):
+        if all(math.dist(first, other) >= START_GAP_M for other in taken):
             break
     else:
         raise ConfigError(f"site {site.name!r} has no room for another bystander")

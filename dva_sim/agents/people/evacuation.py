@@ -55,7 +55,7 @@ DEADLY: Final = Conditions(
 ISO 13571: in 10 kW/m^2 skin burns within seconds; the rest are habits of a person."""
 EVERY: Final = 1.0  # design: a way is looked at so often [m]
 TRIES: Final = 3  # design: to find a way around bad places
-WITHIN: Final = 0.05  # design: of the line of an exit, still indoors [m]
+INDOORS_MARGIN_M: Final = 0.05  # design: of the line of an exit, still indoors [m]
 ROUNDING: Final = 1e-6  # design: a straight way of many steps may seem so much shorter [m]
 
 USUAL: Final = LeavingHabits()
@@ -89,7 +89,7 @@ def refuges_of(site: Site) -> list[Point]:
     if not site.exits:
         return [(pose.x, pose.y) for pose in site.guard_posts or site.robot_bases]
     ways = [(way, math.cos(way.heading), math.sin(way.heading)) for way in site.exits]
-    return [(way.x - WITHIN * dx, way.y - WITHIN * dy) for way, dx, dy in ways]
+    return [(way.x - INDOORS_MARGIN_M * dx, way.y - INDOORS_MARGIN_M * dy) for way, dx, dy in ways]
 
 
 def choose_escape(

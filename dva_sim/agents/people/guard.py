@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import takewhile
 
-from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, do_nothing
+from dva_sim.agents.device import MAX_BID, STATUS, AgentDevice, do_nothing
 from dva_sim.agents.observation import SEEN_THROUGH, no_smoke
 from dva_sim.agents.people.evacuation import AirAt, Exposure, OnFoot, WayOut, clean_air
 from dva_sim.agents.people.guard_protocol import Errand, GuardProtocol
@@ -129,7 +129,7 @@ class GuardAgent(OnFoot):
         )
         ready = 0.0 if under_way else self._walker.usual_mobilisation
         arrival = ready + way / self._walker.speed
-        if arrival <= LONGEST_BID:
+        if arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     # --- the way -----------------------------------------------------------------------

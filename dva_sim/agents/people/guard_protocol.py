@@ -15,8 +15,8 @@ from typing import NamedTuple
 from dva_sim.protocol import messages as m
 
 AWARD_WITHIN = 60.0  # design: after the last bid for so long an award may come [s]
-MOST_ANNOUNCED = 32  # design: announcements that are remembered; the oldest are forgotten first
-OVER = "done"  # the DVA's word that an order is over
+MAX_ANNOUNCED = 32  # design: announcements that are remembered; the oldest are forgotten first
+ORDER_DONE = "done"  # the DVA's word that an order is over
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class GuardProtocol:
         match message.body:
             case m.Order(device=None) as order:
                 return self._ordered(order, now)
-            case m.OrderProgress(state=state) as word if state == OVER:
+            case m.OrderProgress(state=state) as word if state == ORDER_DONE:
                 return self._stand_down(word)
             case m.Relocation(position=place):
                 return self._relocated(place, now)
@@ -143,7 +143,7 @@ class GuardProtocol:
         until = now + announcement.bid_within + AWARD_WITHIN
         self._announced[announcement.event_id] = announcement, until
         self._announced.move_to_end(announcement.event_id)
-        if len(self._announced) > MOST_ANNOUNCED:
+        if len(self._announced) > MAX_ANNOUNCED:
             self._announced.popitem(last=False)
         return GuardDecision(m.OK, bid_on=announcement if self.order is None else None)
 

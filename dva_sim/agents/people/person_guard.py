@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, do_nothing
+from dva_sim.agents.device import MAX_BID, STATUS, AgentDevice, do_nothing
 from dva_sim.agents.people.evacuation import AirAt, Exposure, OnFoot, clean_air
 from dva_sim.agents.people.guard import (
     CONFIRMED,
@@ -274,7 +274,7 @@ class PersonGuard(OnFoot):
     def _bid(self, announced: m.TaskAnnouncement) -> None:
         way = self._planner.distance(self.walking.place, self._xy(announced.position))
         arrival = self._walker.usual_mobilisation + way / self._walker.speed
-        if self.order is None and arrival <= LONGEST_BID:
+        if self.order is None and arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     def _give_back(self, state: str, why: str) -> None:

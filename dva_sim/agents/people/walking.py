@@ -46,7 +46,7 @@ from dva_sim.worlds.planning import Disc, Planner
 STEP: Final = 0.2  # design: between looks at the way [s]
 CALM: Final = 0.4  # design: the same while nobody is near and the end is not [s]
 PLANS_EVERY: Final = 1.0  # design: no other way is planned sooner than this after the last [s]
-MOST_SEEN: Final = 8  # design: of those near, the nearest count
+MAX_SEEN: Final = 8  # design: of those near, the nearest count
 
 
 @dataclass(eq=False)
@@ -277,8 +277,8 @@ class Walking:
         body = self.body
         around = self._ground.neighbours(body.x, body.y, self._reach)
         reach = self._own.reach_m
-        self._reach = 0.5 * reach if len(around) > 2 * MOST_SEEN else reach
-        return [other for other, _ in around if other is not body][:MOST_SEEN]
+        self._reach = 0.5 * reach if len(around) > 2 * MAX_SEEN else reach
+        return [other for other, _ in around if other is not body][:MAX_SEEN]
 
     # --- in the way --------------------------------------------------------------------
 

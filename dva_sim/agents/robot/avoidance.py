@@ -32,7 +32,7 @@ SQUEEZE = 0.20  # gap to people who stand in the way and do not go [m]; assumed
 CREEP = 0.15  # speed beside somebody [m/s]; assumed
 LANE_ROOM = 0.06  # gap to walls in a lane other than the planned one [m]; assumed
 
-AHEAD = 4.0  # how far ahead lanes are looked at [m]
+LOOK_AHEAD_M = 4.0  # how far ahead lanes are looked at [m]
 STEP = 0.2  # between the points of a lane [m]
 RAMP = 1.2  # way on which a lane goes over to the side [m]
 HOLDS = (1.6, 2.8, 4.0)  # where a lane goes back to the middle [m]
@@ -115,7 +115,7 @@ class Avoidance:
             others: Others nearby.
             last: The side that was chosen before [m].
         """
-        way = np.arange(0.0, min(AHEAD, route.length - along) + STEP, STEP)
+        way = np.arange(0.0, min(LOOK_AHEAD_M, route.length - along) + STEP, STEP)
         base = np.array([route.point_at(along + s) for s in way.tolist()])
         left = _to_the_left(base)
         # Written out: a product of arrays is rounded as the processor's library likes.
@@ -227,7 +227,7 @@ def _blocked(
     at = np.where(tight.any(axis=1), way[tight.argmax(axis=1)], math.inf)
     order = np.lexsort((gaps.min(axis=1), at))
     first = int(order[0])
-    return Blocked(others[first], min(float(at[first]), AHEAD), float(gaps.min()), lane)
+    return Blocked(others[first], min(float(at[first]), LOOK_AHEAD_M), float(gaps.min()), lane)
 
 
 def pace_among(people: Sequence[Nearby], here: Point, radius: float, speed: float) -> float:

@@ -91,7 +91,7 @@ KEEP_WALL = 0.01  # kept to walls; the grid is on the safe side by up to a cell 
 TIME_TO_CONTACT = 1.0  # speed is scaled so that contact is at least so far off [s]; assumed
 REACTION = 0.35  # until brakes answer: a period of the loop, and the motors' lag [s]; assumed
 STEP = 0.05  # between the samples of an arc [m]
-AWAY = 0.005  # a gap that shrinks by less does not shrink [m]
+STEADY_GAP_M = 0.005  # a gap that shrinks by less does not shrink [m]
 SLOWEST = 1e-3  # slower than this is not at all [m/s]
 ROUNDS = 4  # a slower robot turns more sharply: its arc is looked at again so often
 
@@ -168,7 +168,7 @@ class CollisionGuard:
         for other in others:
             gap = np.hypot(points[:, 0] - other.x, points[:, 1] - other.y)
             gaps.append((gap - self.radius - other.radius, other.keep))
-        stops = [_first(gap < min(keep, float(gap[0]) - AWAY)) for gap, keep in gaps]
+        stops = [_first(gap < min(keep, float(gap[0]) - STEADY_GAP_M)) for gap, keep in gaps]
         first = min(stops)
         return reach if first >= len(way) else float(max(way[first] - STEP, 0.0))
 

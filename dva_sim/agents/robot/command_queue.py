@@ -28,8 +28,8 @@ from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
-OTHERS = 64  # messages that may wait of all but the holder: each look at them has its price
-EACH = 8  # messages that may wait of a connection that is not the holder's
+MAX_OF_OTHERS = 64  # messages that may wait of all but the holder: each look at them has its price
+PER_CONNECTION = 8  # messages that may wait of a connection that is not the holder's
 REST = 4.0  # how long strangers rest after a message of theirs, in times of its processing
 AFTER_HOLDER = 1.0  # and for so long they wait for a message of its holder, to come behind it [s]
 TICK = 1e-6  # of the clock [s]
@@ -88,11 +88,13 @@ LineOf = tuple[Hashable, bool]  # whose, and whether it is of commands
 class FairQueue:
     """A line for the control and one for the commands of each connection; lines have turns.
 
-    A busy sender delays only itself. A connection that is not the holder's has `EACH` places;
-    where there is no room at all, the newest of the longest line makes some, strangers first.
+    A busy sender delays only itself. A connection that is not the holder's has
+    `PER_CONNECTION` places; where there is no room at all, the newest of the longest line makes
+    some, strangers first.
 
     Args:
-        limit: Maximum number of queued messages of the holder; of others no more than `OTHERS`.
+        limit: Maximum number of queued messages of the holder; of others no more than
+            `MAX_OF_OTHERS`.
         standing: Current standing of a message's sender: a grant that comes meanwhile counts.
 
     Attributes:
@@ -134,9 +136,9 @@ class FairQueue:
         Another, which is gone then, or itself.
         """
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
-        if standing is not HOLDER and sum(mine) >= EACH:
+        if standing is not HOLDER and sum(mine) >= PER_CONNECTION:
             return letter
-        places = self._limit if standing is HOLDER else min(self._limit, OTHERS)
+        places = self._limit if standing is HOLDER else min(self._limit, MAX_OF_OTHERS)
         if self.length >= places:
             beside = self._beside(standing is HOLDER)
             if sum(map(len, beside.values())) >= places:
@@ -278,7 +280,7 @@ class CommandQueue:
     def _has_room(self, peer: Hashable) -> bool:
         """Return True with room for one more emergency; those that wait stop the robot as well."""
         of_peer = sum(letter.peer == peer for letter in self._emergencies)
-        return of_peer < EACH and len(self._emergencies) < self._limit
+        return of_peer < PER_CONNECTION and len(self._emergencies) < self._limit
 
     def published(self, data: bytes, message: Message | None = None) -> None:
         """Take a command that nobody waits to be answered; its reader says so."""

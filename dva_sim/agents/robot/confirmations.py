@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.robot.command_queue import OTHERS, Letter
-from dva_sim.agents.robot.controller import PATIENCE, Decision, RobotController
+from dva_sim.agents.robot.command_queue import MAX_OF_OTHERS, Letter
+from dva_sim.agents.robot.controller import INQUIRY_WAIT_S, Decision, RobotController
 from dva_sim.agents.robot.decision_log import ASKS, NO_ANSWER
 from dva_sim.protocol import messages as m
 
-EACH = 2  # messages of a connection that may wait: a device sends one at a time, perhaps again
+PER_CONNECTION = (
+    2  # messages of a connection that may wait: a device sends one at a time, perhaps again
+)
 PER_TIMEOUT = 3.0  # a message waits for this part of the time-out of a request, or longer
 
 
@@ -77,12 +79,12 @@ class Confirmations:
     def keep(self, letter: Letter, message: m.Message) -> bool:
         """Queue a message until the DVA has answered; False if the queue is full."""
         of_peer = sum(one.letter.peer == letter.peer for one in self._waiting)
-        if of_peer >= EACH or len(self._waiting) >= OTHERS:
+        if of_peer >= PER_CONNECTION or len(self._waiting) >= MAX_OF_OTHERS:
             return False
         reader = message.source if isinstance(message.body, m.DevSub) else None
         waiting = Waiting(letter, reader)
         self._waiting.append(waiting)
-        patience = max(PATIENCE, self._device.timeout / PER_TIMEOUT)
+        patience = max(INQUIRY_WAIT_S, self._device.timeout / PER_TIMEOUT)
         self._device.clock.call_after(patience, self._release, [waiting])
         return True
 

@@ -18,8 +18,8 @@ from dva_sim.protocol import messages as m
 
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
 ENDS = "done", "failed"  # how a mission ends
-MOST_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
-PATIENCE = 3.0  # so long an order waits for what the DVA says of its sender, or longer [s]
+MAX_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
+INQUIRY_WAIT_S = 3.0  # so long an order waits for what the DVA says of its sender, or longer [s]
 
 
 class Mode(StrEnum):
@@ -44,7 +44,7 @@ class TimedSetPoint(NamedTuple):
 _make_set_point = maker(TimedSetPoint)
 
 
-STAND = TimedSetPoint(0.0, 0.0, 0.0)
+STANDSTILL = TimedSetPoint(0.0, 0.0, 0.0)
 NO_MISSION = m.MissionStatus(0, "none", 0, "")
 Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
@@ -241,7 +241,7 @@ class RobotController:
             return Decision(m.OK, "is in hand already")
         if self.grant is not None:
             return Decision(m.BUSY, f"held by {self.grant.holder}")
-        if self.inquiry.is_open and now < self.inquiry.asked_at + PATIENCE:
+        if self.inquiry.is_open and now < self.inquiry.asked_at + INQUIRY_WAIT_S:
             return Decision(m.BUSY, "the DVA is being asked who holds it")
         refusal = self._begin(math.inf, moving, releases=self.latch.starts())
         if refusal is not None:
@@ -250,7 +250,7 @@ class RobotController:
             self.latch.release(None)
         self.by_hand = who
         self.last_valid = now
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)
 
     def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
         """Return a set point of whom the robot is in the hands of; in force until the watchdog.
@@ -279,13 +279,13 @@ class RobotController:
         self._idle("emergency")
         self.emergency_at = now
         self.latch.close(stopped_by, now, self.tick(now))
-        return Decision(m.OK, "stopped", STAND)
+        return Decision(m.OK, "stopped", STANDSTILL)
 
     def stand(self, now: float) -> Decision:
         """Stop and forget all orders of before; unlike an emergency, the next order moves it."""
         self._idle("stopped")
         self.emergency_at = now
-        return Decision(m.OK, "stopped", STAND)
+        return Decision(m.OK, "stopped", STANDSTILL)
 
     def release_by_hand(self, label: str) -> Decision:
         """Release the robot after an emergency: somebody stands beside it and sees that it may."""
@@ -299,7 +299,7 @@ class RobotController:
         if self.by_hand is None or self.by_hand != who:
             return Decision(m.WRONG_MODE, "it is not in this hand")
         self._idle("")
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)
 
     def mission_changed(self, state: str, left: int, reason: str) -> bool:
         """Hear from the robot how its mission goes on; return True if that is news.
@@ -407,13 +407,13 @@ class RobotController:
         if self.owner is None:  # also where it is in somebody's hand, who goes on
             return Decision(m.OK)
         self._idle("revoked")
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)
 
     def _full(self, observer: str) -> Decision | None:
         """Refuse one more observer if the limit is reached; the driver continues."""
-        if observer in self.observers or len(self.observers) < MOST_OBSERVERS:
+        if observer in self.observers or len(self.observers) < MAX_OBSERVERS:
             return None
-        return Decision(m.BUSY, f"this robot serves at most {MOST_OBSERVERS} observers")
+        return Decision(m.BUSY, f"this robot serves at most {MAX_OBSERVERS} observers")
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
@@ -520,7 +520,7 @@ class RobotController:
         self.mode = TELEOPERATION
         self.owner = message.source
         self.last_valid = now
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)
 
     def _set(self, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Decision:
         refusal = self._refusal(message, "teleoperation")
@@ -555,11 +555,11 @@ class RobotController:
             return refusal
         if self.mode is IDLE and self.by_hand is None:
             # After its computer hung, its motors may still have what they were told before.
-            return Decision(m.OK, "not in teleoperation", STAND)
+            return Decision(m.OK, "not in teleoperation", STANDSTILL)
         if self.mode is not TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")
         self._idle("")
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)
 
     def _mission(self, message: m.Message, body: Mission, arrived: float, moving: bool) -> Decision:
         refusal = self._refusal(message, "missions")
@@ -581,4 +581,4 @@ class RobotController:
             return refusal
         if self.mode is MISSION:
             self._idle("cancelled")
-        return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK, set_point=STANDSTILL)

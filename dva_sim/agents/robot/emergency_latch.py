@@ -14,7 +14,7 @@ from dva_sim.protocol import messages as m
 
 PERSON: Final = "person"
 DRIVE: Final = "drive"
-LONGEST_STOP_S = 1e6  # the protocol's limit
+MAX_STOP_S = 1e6  # the protocol's limit
 
 
 @dataclass
@@ -83,5 +83,5 @@ class EmergencyLatch:
 
     def message(self, now: float) -> m.RobotEmergency:
         """Return the emergency as the robot publishes it and sends it to the DVA."""
-        stopped_for = min(max(0.0, now - self.since), LONGEST_STOP_S)
+        stopped_for = min(max(0.0, now - self.since), MAX_STOP_S)
         return m.RobotEmergency(self.stopped_by, stopped_for, self.tick, self.released)

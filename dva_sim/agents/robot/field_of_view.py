@@ -33,7 +33,7 @@ class HazardSpot(NamedTuple):
 make_spot = maker(HazardSpot)
 
 
-NEAR = 0.5  # smoke so far before the camera stands between it and everything [m]
+OPAQUE_DEPTH_M = 0.5  # smoke so far before the camera stands between it and everything [m]
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,6 @@ class FieldOfView:
         ahead = math.cos(heading), math.sin(heading)
         thickest = max(
             self.smoke((x, y), (x + far * ahead[0], y + far * ahead[1])) / far
-            for far in (NEAR, self.range)
+            for far in (OPAQUE_DEPTH_M, self.range)
         )
         return min(SEEN_THROUGH / thickest, CLEAR) if thickest > 0.0 else CLEAR

@@ -16,9 +16,9 @@ from dva_sim.protocol import messages as m
 
 BURST = 4.0  # questions that may follow each other at once
 RATE = 4.0  # sustained rate limit [1/s]
-MOST_READERS = 64  # devices that wait to be asked about
-MOST_OVER = 1000  # sessions said to be over while one question is under way
-LEAST = 1e-5  # tolerance of a query for clocks that round to microseconds [s]
+MAX_READERS = 64  # devices that wait to be asked about
+MAX_OVER = 1000  # sessions said to be over while one question is under way
+CLOCK_TOLERANCE_S = 1e-5  # tolerance of a query for clocks that round to microseconds [s]
 
 
 @dataclass
@@ -67,12 +67,12 @@ class Inquiry:
 
     def about_reader(self, device: str) -> None:
         """Open the question which sensors a device may read."""
-        if len(self._readers) < MOST_READERS:
+        if len(self._readers) < MAX_READERS:
             self._readers[device] = None
 
     def is_over(self, session: int) -> None:
         """Note that a session is said to be over: an answer under way may be older than that."""
-        if self.asked is not None and len(self._over) <= MOST_OVER:
+        if self.asked is not None and len(self._over) <= MAX_OVER:
             self._over.add(session)
 
     def due(self, now: float) -> float:
@@ -80,7 +80,7 @@ class Inquiry:
         if self.asked is not None or not (self._holder or self._readers):
             return math.inf
         lacking = 1.0 - self._allowed(now)
-        return now if lacking <= LEAST else now + lacking / RATE
+        return now if lacking <= CLOCK_TOLERANCE_S else now + lacking / RATE
 
     def next(self, now: float) -> m.GetGrant | None:
         """Take the next question, which is then under way, if one may be asked now."""
@@ -132,7 +132,7 @@ class Inquiry:
             self._again(question)
 
     def _was_over(self, session: int) -> bool:
-        return session in self._over or len(self._over) > MOST_OVER
+        return session in self._over or len(self._over) > MAX_OVER
 
     def _again(self, question: m.GetGrant) -> None:
         if question.level is None:

@@ -20,18 +20,18 @@ from dva_sim.agents.route_following import Intent, wrap
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
-STAND = Intent(0.0, 0.0)
+STANDSTILL = Intent(0.0, 0.0)
 GAIN = 2.0  # of turning towards a heading [1/s]
 FACING = 0.1  # nearer than this one faces it [rad]
-SLOWLY = 0.25  # speed of manoeuvres [m/s]; assumed
+MANOEUVRE_MPS = 0.25  # speed of manoeuvres [m/s]; assumed
 GET_AWAY = 0.5  # way driven after a jam before planning again [m]; assumed
 HEADINGS = 16  # looked at for a way out
-TRIED = 0.5  # a heading so near one that did not help is not tried again [rad]
-THERE = 0.15  # a place beside the way is reached from here [m]
+TRIED_WITHIN_RAD = 0.5  # a heading so near one that did not help is not tried again [rad]
+REACHED_WITHIN_M = 0.15  # a place beside the way is reached from here [m]
 FREE_FOR = 1.0  # the way must be free for so long before a robot goes on [s]; assumed
-LONGEST_RECOVERY = 12.0  # [s]; assumed
-LONGEST_ASIDE = 30.0  # [s]; assumed
-STILL = 0.05  # slower people stand [m/s]; assumed
+MAX_RECOVERY = 12.0  # [s]; assumed
+MAX_ASIDE = 30.0  # [s]; assumed
+STANDS_BELOW_MPS = 0.05  # slower people stand [m/s]; assumed
 NOBODY_MOVES = 4.0  # who stands for so long will not pass [s]; assumed
 PASSED = 0.10  # gap left between the way and who has passed [m]
 
@@ -99,7 +99,7 @@ class JamRecovery(Manoeuvre):
     ) -> None:
         self._guard = guard
         self._turn = most_turn
-        self._until = seen.now + LONGEST_RECOVERY
+        self._until = seen.now + MAX_RECOVERY
         self._start = seen.here
         self._turned = False
         self.heading = self._way_out(seen, tried)
@@ -109,8 +109,8 @@ class JamRecovery(Manoeuvre):
 
         def worth(heading: float) -> float:
             pose = (*seen.here, heading)
-            free = self._guard.free_way(pose, SLOWLY, 0.0, seen.nearby, 2 * GET_AWAY)
-            again = any(abs(wrap(heading - other)) < TRIED for other in tried)
+            free = self._guard.free_way(pose, MANOEUVRE_MPS, 0.0, seen.nearby, 2 * GET_AWAY)
+            again = any(abs(wrap(heading - other)) < TRIED_WITHIN_RAD for other in tried)
             return free - 0.1 * abs(wrap(heading - seen.view.heading)) - 5.0 * again
 
         turns = [2.0 * math.pi * number / HEADINGS for number in range(1, HEADINGS)]
@@ -122,7 +122,7 @@ class JamRecovery(Manoeuvre):
             return None
         self._turned = self._turned or abs(wrap(self.heading - seen.view.heading)) < FACING
         turn = turn_to(seen.view, self.heading, self._turn)
-        return Intent(SLOWLY, turn.turn_rate) if self._turned else turn
+        return Intent(MANOEUVRE_MPS, turn.turn_rate) if self._turned else turn
 
 
 class Aside(Manoeuvre):
@@ -146,7 +146,7 @@ class Aside(Manoeuvre):
         self._way = way
         self._radius = radius
         self._turn = most_turn
-        self._until = seen.now + LONGEST_ASIDE
+        self._until = seen.now + MAX_ASIDE
         self._arrived = False
         self._free_since = math.inf
         self._moved = seen.now
@@ -154,18 +154,22 @@ class Aside(Manoeuvre):
     def step(self, seen: Sensed) -> Intent | None:
         """Drive there, stand, and go on when the way has been free for a moment."""
         self._free_since = min(self._free_since, seen.now) if self._is_free(seen) else math.inf
-        if any(math.hypot(other.vx, other.vy) > STILL for other in seen.nearby):
+        if any(math.hypot(other.vx, other.vy) > STANDS_BELOW_MPS for other in seen.nearby):
             self._moved = seen.now
         stays = self._arrived and seen.now - self._moved > NOBODY_MOVES
         if seen.now - self._free_since >= FREE_FOR or seen.now > self._until or stays:
             return None
-        self._arrived = self._arrived or math.dist(seen.here, self._place) < THERE
+        self._arrived = self._arrived or math.dist(seen.here, self._place) < REACHED_WITHIN_M
         if self._arrived:
             return Intent(0.0, 0.0)
         x, y = self._place
         bearing = math.atan2(y - seen.view.y, x - seen.view.x)
         turn = turn_to(seen.view, bearing, self._turn)
-        return turn if abs(wrap(bearing - seen.view.heading)) > 0.3 else turn._replace(speed=SLOWLY)
+        return (
+            turn
+            if abs(wrap(bearing - seen.view.heading)) > 0.3
+            else turn._replace(speed=MANOEUVRE_MPS)
+        )
 
     def _is_free(self, seen: Sensed) -> bool:
         """Return True if nobody is on the path ahead, or will be in a moment."""
@@ -239,7 +243,7 @@ class Inspection:
             return self._face(seen, self._place)
         self._turned += abs(seen.view.heading - self._heading)
         self._heading = seen.view.heading
-        return STAND if self._turned > 2.0 * math.pi else Intent(0.0, LOOK_AROUND)
+        return STANDSTILL if self._turned > 2.0 * math.pi else Intent(0.0, LOOK_AROUND)
 
     def _is_at_view(self, seen: Sensed) -> bool:
         event = self._in_view(seen)
@@ -260,5 +264,5 @@ class Inspection:
     def _face(self, seen: Sensed, place: Point) -> Intent:
         bearing = math.atan2(place[1] - seen.view.y, place[0] - seen.view.x)
         if abs(wrap(bearing - seen.view.heading)) < FACING:
-            return STAND
+            return STANDSTILL
         return turn_to(seen.view, bearing, self._most)

@@ -5,7 +5,7 @@ The rules, in the order in which they are asked:
 
 1. A battery that is nearly empty ends any mission but the way home.
 2. Who is jammed turns to where it is free, drives off a little, and takes another way; after
-   `MOST_JAMS` times without having reached a place in between, the mission fails.
+   `MAX_JAMS` times without having reached a place in between, the mission fails.
 3. Past people and other robots it goes in a free lane (`avoidance`), slower beside people.
 4. Where no lane is free it stops short. Who has to let the other one go first steps aside until the
    other has passed. Who is still blocked after `AROUND_AFTER` looks for a way around everybody in
@@ -26,7 +26,14 @@ from dva_sim.agents.population import Population, median_person
 from dva_sim.agents.robot.avoidance import SQUEEZE, Avoidance, Blocked, pace_among
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
 from dva_sim.agents.robot.controller import Mission
-from dva_sim.agents.robot.manoeuvres import STAND, Aside, Inspection, JamRecovery, Manoeuvre, Sensed
+from dva_sim.agents.robot.manoeuvres import (
+    STANDSTILL,
+    Aside,
+    Inspection,
+    JamRecovery,
+    Manoeuvre,
+    Sensed,
+)
 from dva_sim.agents.route_following import Intent, PurePursuit, Reach, Route, View
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Disc, Planner
@@ -69,18 +76,18 @@ class MissionGoal:
 
 
 PERIOD = 0.1  # of the robot's own loop [s]
-NEAR = 0.3  # a waypoint counts as reached from here [m]
-CLOSE_BY = 1.8  # and from here if somebody stands on it [m]
+REACHED_WITHIN_M = 0.3  # a waypoint counts as reached from here [m]
+REACHED_IF_TAKEN_M = 1.8  # and from here if somebody stands on it [m]
 RESERVE = 0.05  # charge below which a robot only goes home; assumed
-MOST_JAMS = 3  # recoveries between two waypoints; assumed
+MAX_JAMS = 3  # recoveries between two waypoints; assumed
 NO_PROGRESS = 15.0  # on the way without getting on for so long is a jam, too [s]; assumed
 STOP_SHORT = 1.0  # way left free before who is in the way [m]; assumed
-STILL = 0.05  # who is slower stands [m/s]
+STANDS_BELOW_MPS = 0.05  # who is slower stands [m/s]
 SAY_AFTER = 0.5  # [s]; assumed, as all of these
 ASIDE_AFTER = 1.0  # [s]
 AROUND_AFTER = 4.0  # [s]
 AROUND_AGAIN = 6.0  # [s]
-AROUND = 0.08  # a way around somebody keeps so much more [m]
+DETOUR_MARGIN_M = 0.08  # a way around somebody keeps so much more [m]
 SQUEEZE_AFTER = 10.0  # [s]
 GIVE_UP_AFTER = 60.0  # [s]
 
@@ -174,7 +181,7 @@ class Pilot:
         return len(self._errand.goals) - self._reached % len(self._errand.goals)
 
     def _end(self, state: str, reason: str = "") -> PilotStep:
-        return PilotStep(STAND, state, 0 if state == "done" else self._left, reason)
+        return PilotStep(STANDSTILL, state, 0 if state == "done" else self._left, reason)
 
     def _move(self, seen: Sensed, intent: Intent, state: str, reason: str = "") -> PilotStep:
         """Go, but never into anything, and gently beside people."""
@@ -190,7 +197,7 @@ class Pilot:
         if route is None:
             return self._end("failed", "no way")
         left = route.remaining(seen.view.x, seen.view.y)
-        if left < NEAR:
+        if left < REACHED_WITHIN_M:
             return self._arrive()
         if self._gets_nowhere(seen, left):
             return self._jam(seen)
@@ -207,7 +214,9 @@ class Pilot:
 
     def _drive(self, route: Route, seen: Sensed) -> Intent:
         """Return the way's next intent; a car drives its sharpest curve where others turn."""
-        speed, turn_rate = self._driver.drive(route, View(seen.now, seen.view, PERIOD), NEAR)
+        speed, turn_rate = self._driver.drive(
+            route, View(seen.now, seen.view, PERIOD), REACHED_WITHIN_M
+        )
         return Intent(
             max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate
         )
@@ -228,7 +237,7 @@ class Pilot:
         if laps and self._reached >= laps * goals:
             return self._end("done")
         self._begin_leg()
-        return PilotStep(STAND, "under_way", self._left)
+        return PilotStep(STANDSTILL, "under_way", self._left)
 
     def _gets_nowhere(self, seen: Sensed, left: float) -> bool:
         best, since = self._progress
@@ -260,7 +269,7 @@ class Pilot:
         """Stop short; then step aside, or look for a way around, or give up."""
         self._blocked_since = min(self._blocked_since, seen.now)
         waited = seen.now - self._blocked_since
-        if math.hypot(blocked.by.vx, blocked.by.vy) > STILL:
+        if math.hypot(blocked.by.vx, blocked.by.vy) > STANDS_BELOW_MPS:
             self._moved = seen.now
         if waited > GIVE_UP_AFTER:
             return self._end("failed", "no way")
@@ -290,9 +299,9 @@ class Pilot:
 
     def _is_taken(self, left: float, other: Nearby) -> bool:
         """Return True if somebody stands at the goal, and the robot is as near as it can be."""
-        is_stationary = math.hypot(other.vx, other.vy) < STILL
+        is_stationary = math.hypot(other.vx, other.vy) < STANDS_BELOW_MPS
         gap = math.dist((other.x, other.y), self._goal) - other.radius
-        return is_stationary and left < CLOSE_BY and gap < self._radius + other.keep
+        return is_stationary and left < REACHED_IF_TAKEN_M and gap < self._radius + other.keep
 
     def _lets_pass(self, seen: Sensed, other: Nearby) -> bool:
         """Return True if it should step aside: once for each who goes first and does not leave."""
@@ -318,20 +327,20 @@ class Pilot:
         """Plan again with everybody in sight as part of the map."""
         self._looked_around = seen.now
         before = self._closed
-        self._closed = [Disc(o.x, o.y, o.radius + o.keep + AROUND) for o in seen.nearby]
+        self._closed = [Disc(o.x, o.y, o.radius + o.keep + DETOUR_MARGIN_M) for o in seen.nearby]
         points = self._planner.path(seen.here, self._goal, self._closed)
         if points is None:
             self._closed = before
             return None
         self._route = Route(points)
         self._progress = math.inf, math.inf
-        return PilotStep(STAND, "replanning", self._left, "the way is closed")
+        return PilotStep(STANDSTILL, "replanning", self._left, "the way is closed")
 
     # --- jams --------------------------------------------------------------------------
 
     def _jam(self, seen: Sensed) -> PilotStep:
         self._jams += 1
-        if self._jams > MOST_JAMS:
+        if self._jams > MAX_JAMS:
             return self._end("failed", "jammed")
         heading = seen.view.heading
         nose = self._radius + 0.1
@@ -348,5 +357,5 @@ class Pilot:
         if intent is None:
             self._manoeuvre = None
             self._route = None
-            return PilotStep(STAND, "under_way", self._left)
+            return PilotStep(STANDSTILL, "under_way", self._left)
         return self._move(seen, intent, manoeuvre.state, manoeuvre.reason)

@@ -14,7 +14,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.yaml_files import Document, load_yaml
-from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
+from dva_sim.worlds.drives import MAX_TICK, DriveSpec, load_drive
 
 FOLDER: Final = "agents/robots"
 
@@ -67,7 +67,7 @@ class RobotProfile(Config):
 
     @model_validator(mode="after")
     def _no_tunnelling(self) -> RobotProfile:
-        most = self._spec().safe_speed(LONGEST_TICK)
+        most = self._spec().safe_speed(MAX_TICK)
         if self.max_speed_mps > most:
             problem = f"max_speed_mps should be at most {most:.3g} for a body of this size"
             raise ValueError(f"{problem}: faster, it could pass through a wall within a tick")

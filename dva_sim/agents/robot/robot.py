@@ -9,7 +9,7 @@ from functools import partial
 from dva_sim.agents.device import (
     EMERGENCY,
     HOLDER,
-    LONGEST_BID,
+    MAX_BID,
     MISSION,
     STATUS,
     AgentDevice,
@@ -21,7 +21,7 @@ from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Stan
 from dva_sim.agents.robot.confirmations import Confirmations
 from dva_sim.agents.robot.controller import (
     ENDS,
-    STAND,
+    STANDSTILL,
     TELEOPERATION,
     Decision,
     Mission,
@@ -60,7 +60,7 @@ DVAS_ONLY = (
 )
 RESTRICTED = HOLDERS_ONLY | DVAS_ONLY
 DRIVING = m.StartTeleOp, m.SetTeleOp
-LONGEST_HELD = 1e6  # [s]
+MAX_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 STATUS_PERIOD = 1.0  # [s]
 WAKES_UP = 1.0  # what arrives so soon after a sleep may have been sent before its end [s]
@@ -154,7 +154,7 @@ class RobotAgent:
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
-        self.set_point = STAND
+        self.set_point = STANDSTILL
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.unfit = ""
@@ -268,7 +268,7 @@ class RobotAgent:
         computer steers, stops at once.
         """
         if self.controller.mode is Mode.MISSION:
-            self.move(STAND)
+            self.move(STANDSTILL)
         self._happened(HANGS)
         before = self.controller.mode
         self.controller.hang()
@@ -514,7 +514,7 @@ class RobotAgent:
         me = self.device.id_tag
         fares = self._fares
         self._last_published = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
-        held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
+        held = min(self.device.clock.now - self._held_since, MAX_HELD)
         if network.ready(me, HOLDER, WHATEVER_WAITS):
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
 
@@ -584,7 +584,7 @@ class RobotAgent:
         goal = self.device.frame.to_xy(place.latitude, place.longitude)
         way = self._planner.distance((pose.x, pose.y), goal)
         arrival = EXPECTED_READY + way / EXPECTED_SPEED
-        if arrival <= LONGEST_BID:
+        if arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     def _log_command(

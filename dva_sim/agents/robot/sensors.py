@@ -33,7 +33,7 @@ from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
-MOST = 64  # subscriptions at one robot
+MAX_SUBSCRIPTIONS = 64  # subscriptions at one robot
 FASTEST = 20.0  # values that a robot gives, at most [Hz]
 SLOWEST = 0.02  # values that a robot gives, at least [Hz]
 
@@ -106,8 +106,8 @@ class SensorSubscriptions:
             return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {fastest:g} times a second"
         self._forget(now)
         subscription = self._subscribed.get(key)
-        if subscription is None and len(self._subscribed) >= MOST:
-            return m.BUSY, f"{MOST} subscriptions are all that this robot serves"
+        if subscription is None and len(self._subscribed) >= MAX_SUBSCRIPTIONS:
+            return m.BUSY, f"{MAX_SUBSCRIPTIONS} subscriptions are all that this robot serves"
         period = 1.0 / wish.frequency
         due = now if subscription is None else min(subscription.due, now + period)
         self._subscribed[key] = _Subscribed(period, now + LEASE, due)

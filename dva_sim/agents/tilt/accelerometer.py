@@ -18,7 +18,9 @@ from dva_sim.kernel.yaml_files import load_yaml
 
 FOLDER: Final = "agents/accelerometers"
 GRAVITY: Final = 9.80665  # source: ISO 80000-3: [m/s^2]
-WHOLE: Final = 1.5 * 2.0**52  # design: added and taken away, which rounds four times as fast
+ROUNDING_TERM: Final = (
+    1.5 * 2.0**52
+)  # design: added and taken away, which rounds four times as fast
 TICK: Final = 2.0**-12  # design: of the clock that tells when a sample is taken [s]
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -154,9 +156,9 @@ class Accelerometer:
         step = self._step
         most = self._range
         if step:
-            x = (x / step + WHOLE - WHOLE) * step
-            y = (y / step + WHOLE - WHOLE) * step
-            z = (z / step + WHOLE - WHOLE) * step
+            x = (x / step + ROUNDING_TERM - ROUNDING_TERM) * step
+            y = (y / step + ROUNDING_TERM - ROUNDING_TERM) * step
+            z = (z / step + ROUNDING_TERM - ROUNDING_TERM) * step
         if -most < x < most and -most < y < most and -most < z < most:
             return x, y, z
         return _cut(x, most), _cut(y, most), _cut(z, most)

@@ -22,7 +22,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, error_text
 
 BATCH: Final = 20  # source: the document: slots of the dissertation's buffer
-MOST_BATCH: Final = 1000  # design: samples of a batch
+MAX_BATCH: Final = 1000  # design: samples of a batch
 
 
 class Filter(ABC):
@@ -294,8 +294,8 @@ def check_filter(filter_: Filter) -> None:
     """
     batch = filter_.batch
     age = filter_.age
-    if batch is not None and not (type(batch) is int and 1 <= batch <= MOST_BATCH):
-        valid = f"None or a whole number, 1 to {MOST_BATCH}"
+    if batch is not None and not (type(batch) is int and 1 <= batch <= MAX_BATCH):
+        valid = f"None or a whole number, 1 to {MAX_BATCH}"
         raise ConfigError(f"its batch is {batch!r}; should be {valid}")
     if not is_age(age):
         raise ConfigError(f"its age is {age!r}; should be a number of samples, at least 0")

@@ -16,7 +16,7 @@ from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.mappings import limited
 from dva_sim.agents.tilt.profile import PhoneProfile
 
-LEAST_WITHIN = 0.1  # design: a gap on the display is closed no sooner than in this time [s]
+MIN_WITHIN = 0.1  # design: a gap on the display is closed no sooner than in this time [s]
 
 
 class GivenTilt(TiltApp):
@@ -69,7 +69,7 @@ class GivenTilt(TiltApp):
 
     def _tilted(self) -> Triple:
         """Return what a perfect part measures of the wanted tilt [m/s^2]."""
-        within = max(LEAST_WITHIN, self._period)
+        within = max(MIN_WITHIN, self._period)
         pitch, roll = self._pose(*self._mapping.tilt_for(self._wanted, self.shown, within))
         flat = GRAVITY * math.cos(pitch)
         return GRAVITY * math.sin(pitch), flat * math.sin(roll), flat * math.cos(roll)

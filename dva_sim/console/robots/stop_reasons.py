@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dva_sim.agents.robot.controller import STAND, Mode
+from dva_sim.agents.robot.controller import STANDSTILL, Mode
 from dva_sim.agents.robot.robot import RobotAgent
 
 STILL = 0.02  # slower it stands [m/s, rad/s]
@@ -32,7 +32,7 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     if controller.latch.holds:
         return "emergency stop"
     if controller.mode is Mode.TELEOPERATION:
-        if point == STAND and not robot.stale:
+        if point == STANDSTILL and not robot.stale:
             return "waits for the first command: its connection is being opened"
         if now >= point.until:
             return _without_command(robot, now)

@@ -12,7 +12,7 @@ from dva_sim.core.dispatch.greedy import Free, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
 from dva_sim.kernel.errors import ConfigError
 
-_AT_ONCE = 1e-6  # [s] times nearer than this are the same
+_SAME_TIME_S = 1e-6  # [s] times nearer than this are the same
 _INF = float("inf")
 _Step = tuple[int, int, float]  # event, unit, when it is sent [s]
 
@@ -107,7 +107,7 @@ class _Search:
         last = steps[-1][2] if steps else -_INF
         if self._dominated(left, (cost, last, *free)):
             return
-        if cost + self._bound(left, free, last) >= self.best - _AT_ONCE:
+        if cost + self._bound(left, free, last) >= self.best - _SAME_TIME_S:
             return
         for response, event, unit, start in self._branches(left, free, last):
             back = start + float(self.busy[event, unit])
@@ -199,6 +199,6 @@ class OraclePolicy(Policy):
         for event in tour:
             if event in tasks:
                 return event
-            if self.plan.release[event] > now + _AT_ONCE:
+            if self.plan.release[event] > now + _SAME_TIME_S:
                 return None
         return None

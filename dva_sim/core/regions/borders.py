@@ -17,7 +17,7 @@ from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import DETECTOR, GUARD, PEER, ROBOT
 
-BEYOND: Final = 2.0  # design: so far inside another region one has crossed the border [m]
+CROSSED_AFTER_M: Final = 2.0  # design: so far inside another region one has crossed the border [m]
 FOR: Final = 10.0  # design: and for so long: who walks along it stays where he was [s]
 ASK_AGAIN: Final = 10.0  # design: pause after a hand-over that was not taken [s]
 BACK: Final = 60.0  # design: pause after a guard was sent back, and is not there [s]
@@ -78,7 +78,7 @@ class Borders:
     def _is_inside(self, place: m.Position) -> bool:
         """Return True for a place that this DVA serves, or just beyond its border."""
         own = (region for region, _ in self.division.served())
-        is_near = any(self.division.outside(region, place) <= BEYOND for region in own)
+        is_near = any(self.division.outside(region, place) <= CROSSED_AFTER_M for region in own)
         return is_near or self.division.dva_at(place) == self.division.own
 
     def _is_free(self, entry: DeviceEntry) -> bool:

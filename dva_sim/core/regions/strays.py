@@ -17,7 +17,7 @@ from dva_sim.core.regions.help import MutualHelp
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
-AGAIN: Final = 10.0  # design: pause after a report that was not taken [s]
+RETRY_DELAY_S: Final = 10.0  # design: pause after a report that was not taken [s]
 
 
 @dataclass
@@ -43,7 +43,7 @@ class Strays:
         self._sends = {send: n for send, n in self._sends.items() if n in events.open}
         sends = []
         for event in self._strays():
-            if now - self._passed.get(event.number, -AGAIN) >= AGAIN:
+            if now - self._passed.get(event.number, -RETRY_DELAY_S) >= RETRY_DELAY_S:
                 self._passed[event.number] = now
                 confidence = round(max(0.0, min(event.confidence, 1.0)), 6)
                 what = event.kind, event.position, event.severity, confidence, "detected"

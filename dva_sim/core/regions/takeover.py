@@ -16,7 +16,7 @@ from dva_sim.protocol.devices import DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.wire_size import sent_time
 
 COME_WITHIN: Final = 4.0  # design: a responder that has not come by then is given up [s]
-MOST_COPIES: Final = 10_000  # of the events of one region
+MAX_COPIES: Final = 10_000  # of the events of one region
 _OF_A_PLACE: Final = PEER, DETECTOR, ROBOT, GUARD
 
 
@@ -66,7 +66,7 @@ class Deputy:
         number = body.event.event_id
         if body.event.closed_for is not None:
             copies.pop(number, None)
-        elif number in copies or len(copies) < MOST_COPIES:
+        elif number in copies or len(copies) < MAX_COPIES:
             copies[number] = Copy(body.event, now)
         return DvaAnswer()
 

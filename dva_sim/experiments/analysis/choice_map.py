@@ -27,10 +27,10 @@ from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import factor_name, measure_called
 from dva_sim.statistics import band
 
-BESIDE = ("contacts", "stop_share")
+SIDE_MEASURES = ("contacts", "stop_share")
 _OF_PERSONS = "operator.", "phone.", "guard.", "bystander."
 _WAITS = "move_and_wait_share"
-_LEAST = 0.05  # regret that is not printed as 0.0
+_SMALLEST_REGRET = 0.05  # regret that is not printed as 0.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class ChoiceMap:
     @property
     def is_shaded(self) -> NDArray[np.bool_]:
         """True for a choice that is worse under some model, the best under none, `(g, c)`."""
-        return np.asarray(self.is_worse & (self.least >= _LEAST))
+        return np.asarray(self.is_worse & (self.least >= _SMALLEST_REGRET))
 
     @property
     def is_best(self) -> NDArray[np.bool_]:
@@ -196,7 +196,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
             column: nan_mean(
                 nan_mean(_cells(view.part, view.part.grid(column), axes), axis=-1), axis=-1
             )
-            for column in BESIDE
+            for column in SIDE_MEASURES
         },
         waiting=_waiting(view, axes, declared.get("choosing")),
         notes=dict(declared.get("notes") or {}),

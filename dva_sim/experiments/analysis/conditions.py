@@ -12,7 +12,7 @@ from dva_sim.simulation.labels import factor_name, level_name, stated_conditions
 from dva_sim.simulation.scenario import TRIPS_OF_A_START, time_out_s
 
 _VARIED = "varied"
-_NOWHERE = "–"
+_NO_VALUE = "–"
 _OF_WAITING = (
     *("command.timeout_s", "robot.processing_s"),
     *("link.delay_s", "link.up.delay_s", "link.down.delay_s"),
@@ -33,7 +33,7 @@ def conditions(
         return []
     varied = {factor.name for factor in factors}
     sites = [_site(s) for s in scenarios.values()]
-    rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
+    rows = [("site", sites)] if any(site != _NO_VALUE for site in sites) else []
     stated = stated_conditions(dict.fromkeys(s.get("model", "full") for s in scenarios.values()))
     stated |= {key: factor_name(key) for key in also if key not in stated}
     for key, name in stated.items():
@@ -136,7 +136,7 @@ def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _site(scenario: Mapping[str, Any]) -> str:
     chosen = get(scenario, "site.map") or get(scenario, "site.name")
-    return str(chosen).rpartition("/")[2] if chosen else _NOWHERE
+    return str(chosen).rpartition("/")[2] if chosen else _NO_VALUE
 
 
 def _text(key: str, value: Any) -> str:
@@ -147,7 +147,7 @@ def _text(key: str, value: Any) -> str:
     if isinstance(value, int | float) and key.endswith(("_bytes", ".bytes")):
         return f"{value / 1000:g} kB"
     if isinstance(value, Mapping):
-        return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NOWHERE
+        return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NO_VALUE
     if isinstance(value, list | tuple):
         return ", ".join(_text(key, item) for item in value)
     if isinstance(value, str):

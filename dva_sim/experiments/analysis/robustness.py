@@ -34,7 +34,7 @@ LOOP = "loop_delay_mean_s"
 PERSONAL = ("delay_human_s", "delay_hand_s")
 LEGS = ("picture_age_mean_s", "age_in_force_mean_s")  # of a loop that is not measured as a whole
 WAITING = "move_and_wait_share"
-SELDOM = 0.05  # a way of steering that takes less of the driving time does not count
+RARE_SHARE = 0.05  # a way of steering that takes less of the driving time does not count
 
 
 Marks = NDArray[np.bool_]
@@ -76,7 +76,7 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
     for name in strategies:
         covered = np.full(delays.shape, bool(ranges(name)))
         for steering, share in (("closed", 1.0 - waits), ("waiting", waits)):
-            covered &= (share <= SELDOM) | _watched(delays, ranges(name, steering))
+            covered &= (share <= RARE_SHARE) | _watched(delays, ranges(name, steering))
         outside &= ~(_has(part, name, own) & covered)
     return Support(delays, outside, "; ".join(map(_coverage, strategies)))
 

@@ -43,7 +43,7 @@ from dva_sim.statistics import LEVEL, Band, Interval, band, mean_interval, perso
 
 POWERS = (0.8, 0.9)
 _ALPHA = 1 - LEVEL
-MOST_PERSONS = 10_000
+MAX_PERSONS = 10_000
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def law_of(
 class Count(NamedTuple):
     """Number of persons needed, with its 95 % interval given the uncertain spread.
 
-    Infinite beyond `MOST_PERSONS`.
+    Infinite beyond `MAX_PERSONS`.
     """
 
     persons: float
@@ -325,15 +325,15 @@ def _count(chance: Callable[[int], float], power: float, persons_so_far: int, le
     # The sum of squares over the true variance is chi-squared; persons go with the variance.
     low, high = (freedom / special.chdtri(freedom, tail) for tail in (0.025, 0.975))
     counts = (max(count, least) for count in (persons, persons * low, persons * high))
-    return Count(*(math.inf if count > MOST_PERSONS else math.ceil(count) for count in counts))
+    return Count(*(math.inf if count > MAX_PERSONS else math.ceil(count) for count in counts))
 
 
 def _fewest(chance: Callable[[int], float], power: float) -> float:
-    """Return the fewest, by doubling, then by halves; infinite beyond `MOST_PERSONS`."""
+    """Return the fewest, by doubling, then by halves; infinite beyond `MAX_PERSONS`."""
     low = 1
     high = 2
     while chance(high) < power:
-        if high > MOST_PERSONS:
+        if high > MAX_PERSONS:
             return math.inf
         low = high
         high = 2 * high

@@ -17,7 +17,7 @@ from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.assumed import Assumption
 from dva_sim.statistics.morris import ElementaryEffects, elementary_effects
 
-MOST_MOVING = 5  # that figures and texts show
+MAX_MOVING = 5  # that figures and texts show
 TABLE = "screening.csv"
 
 
@@ -41,7 +41,7 @@ class Screening:
     @property
     def most_moving(self) -> tuple[tuple[Assumption, ElementaryEffects], ...]:
         """The few that move the answer most; none that does not move it at all."""
-        return tuple(each for each in self.numbers[:MOST_MOVING] if each[1].size > 0.0)
+        return tuple(each for each in self.numbers[:MAX_MOVING] if each[1].size > 0.0)
 
     def write(self, path: Path) -> Path:
         """Write all numbers as a table; the same bytes for the same numbers."""

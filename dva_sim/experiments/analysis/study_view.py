@@ -29,8 +29,8 @@ from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
 from dva_sim.statistics import LEVEL, Band, Interval, adjusted, band, off_zero
 
-MOST_PANELS = 4
-_MOST_OFF = 5.0  # standard errors between the mean of a covariate and zero
+MAX_PANELS = 4
+_MAX_OFF = 5.0  # standard errors between the mean of a covariate and zero
 ROW = "row"  # name of the factor whose levels are the rows of a list
 
 
@@ -93,7 +93,7 @@ class StudyView:
     @property
     def shown(self) -> list[Setting]:
         """The panels that a figure has room for."""
-        return self.panels[:MOST_PANELS]
+        return self.panels[:MAX_PANELS]
 
     @property
     def widest(self) -> float:
@@ -179,7 +179,7 @@ def covariates_of(study: Mapping[str, Any], part: RunGrid) -> tuple[list[str], l
     more than five standard errors off, which happens to one in a million, is not.
     """
     names = list(study.get("covariates") or ())
-    off = {name: off_zero(_of_persons(part, name)) > _MOST_OFF for name in names}
+    off = {name: off_zero(_of_persons(part, name)) > _MAX_OFF for name in names}
     return [n for n in names if not off[n]], [n for n in names if off[n]]
 
 

@@ -23,8 +23,8 @@ from dva_sim.kernel.errors import RunTooLong
 from dva_sim.simulation.models import model_for
 
 PROBE_S = 5.0  # after so long no further run is tried,
-_FEW = 3  # unless there are fewer than that, since one may be far from the others
-MOST_S = 60.0  # for all of them: a run that is ended then costs that much at least
+_MIN_TRIALS = 3  # unless there are fewer than that, since one may be far from the others
+MAX_TRIAL_S = 60.0  # for all of them: a run that is ended then costs that much at least
 _SHORT_S = 1.0  # the first run reads files too; if it is as short as this it is tried again
 
 
@@ -158,14 +158,14 @@ def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
         gone = time.monotonic() - begun
         if costs.get(job.config, 0.0) > _SHORT_S:
             continue
-        if gone > PROBE_S and len(costs) >= _FEW:
+        if gone > PROBE_S and len(costs) >= _MIN_TRIALS:
             break
         clock = clock_of(job)
         start = clock()
         start_wall = time.monotonic()
         is_least = False
         try:
-            with limited(max(MOST_S - gone, _SHORT_S), may_exit=False):
+            with limited(max(MAX_TRIAL_S - gone, _SHORT_S), may_exit=False):
                 probe(job)
         except RunTooLong:
             is_least = True

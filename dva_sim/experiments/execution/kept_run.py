@@ -44,7 +44,7 @@ from dva_sim.simulation.scenario import Scenario
 Missing = dict[str, str]  # reasons, by table
 
 KEPT_RUN: Final = "console.sqlite"  # the journal
-AGAIN: Final = 1.0  # after so long a full disk is tried again [s]
+RETRY_DELAY_S: Final = 1.0  # after so long a full disk is tried again [s]
 _FORMAT: Final = 1
 _TABLES: Final = episodes.TABLES | {
     "drives": drive_rows,
@@ -142,7 +142,7 @@ class KeptRun:
         """Return the new lines, and True if these were the last; lines that failed are retried."""
         journal_lines: list[JournalLine] = []
         with suppress(queue.Empty):
-            batch = self._waiting.get(timeout=AGAIN if is_behind else None)
+            batch = self._waiting.get(timeout=RETRY_DELAY_S if is_behind else None)
             while batch is not None:
                 journal_lines += batch
                 batch = self._waiting.get_nowait()

@@ -32,10 +32,10 @@ _Batches = Generator[list[RunOutcome], None, None]
 
 LIMIT_S = 600.0
 _LOOK_S = 5.0  # how often workers are looked after while none of them answers
-_AHEAD = 2  # chunks handed out for each worker, so that none of them has to wait
+_CHUNKS_PER_WORKER = 2  # chunks handed out for each worker, so that none of them has to wait
 _CHUNK_S = 1.0  # CPU time that a chunk should take
 _SEED_S = 5.0  # and how long it may take until the runs of a random seed are parted
-_LONGEST_CHUNK = 64
+_MAX_CHUNK = 64
 GRACE = 1.5  # times the limit: then the whole process ends, if nothing else helps
 _KILLED = "killed the process it ran in, again and again (out of memory, or beyond its limit?)"
 
@@ -143,8 +143,8 @@ class _Pace:
         rate = self._runs / max(self._cost_s, 1e-9)
         width = workers.width
         left = len(waiting)
-        usual = min(rate * _CHUNK_S, _LONGEST_CHUNK, left // (4 * width))
-        most = max(usual, min(rate * _SEED_S, _LONGEST_CHUNK, left // width))
+        usual = min(rate * _CHUNK_S, _MAX_CHUNK, left // (4 * width))
+        most = max(usual, min(rate * _SEED_S, _MAX_CHUNK, left // width))
         chunk = [waiting.popleft()]
         while waiting and len(chunk) + 1 <= (most if waiting[0].seed == chunk[-1].seed else usual):
             chunk.append(waiting.popleft())
@@ -164,7 +164,7 @@ def _together(
         return
     with workers.executor(workers.width, episode) as executor:
         under_way: _UnderWay = {}
-        most = 1 if workers.is_here else _AHEAD * workers.width
+        most = 1 if workers.is_here else _CHUNKS_PER_WORKER * workers.width
         while (waiting and not suspects) or under_way:
             while waiting and not suspects and len(under_way) < most:
                 chunk = pace.chunk(waiting, workers)

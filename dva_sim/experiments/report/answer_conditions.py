@@ -32,7 +32,7 @@ from dva_sim.simulation.timed.travel import FOUND
 from dva_sim.simulation.timed.unnoticed import Unnoticed, unnoticed
 
 _WAITING = "move_and_wait_share"
-_MOST_KEYS = 5
+_MAX_KEYS = 5
 
 
 def depends(reading: ResultsReading) -> dict[str, str]:
@@ -137,7 +137,7 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
         return assumed_times(scenario, reading.manifest.get("inputs", {}))
     if not get(scenario, STRATEGY):
         return ""
-    effects = kept_effects(_MOST_KEYS)
+    effects = kept_effects(_MAX_KEYS)
     clear = [effect.key for effect in effects if effect.is_clear]
     count = len(all_assumptions())
     return sentence("assumptions", count=count, effects=len(effects), clear=clear, study=MAIN)

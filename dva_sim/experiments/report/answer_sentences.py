@@ -20,7 +20,7 @@ from dva_sim.simulation.labels import (
     setting,
 )
 
-_LEAST = 0.01  # that is not printed as zero
+_SMALLEST_PRINTED = 0.01  # that is not printed as zero
 
 
 def answer(finding: Finding) -> Answer:
@@ -87,7 +87,7 @@ def _no_difference(f: Finding) -> Iterator[str]:
         "no_difference",
         **_facts(f, 0),
         bound=float(f.bounds[chosen].max()),
-        least=_LEAST,
+        least=_SMALLEST_PRINTED,
         place=place(f, np.flatnonzero(f.is_open)) if f.has_too_few else f.everywhere,
         over=factor_name(f.over),
         beyond=bool(set(f.outside) & set(np.flatnonzero(unsure).tolist())),
@@ -119,7 +119,7 @@ def _elsewhere(f: Finding, but: NDArray[np.bool_]) -> Iterator[str]:
     for kind, chosen in kinds.items():
         where = np.flatnonzero(chosen & ~but)
         if len(where):
-            bound = max(float(f.bounds[where].max()), _LEAST)
+            bound = max(float(f.bounds[where].max()), _SMALLEST_PRINTED)
             yield sentence("elsewhere", f=f, kind=kind, place=place(f, where), bound=bound)
 
 

@@ -64,12 +64,12 @@ def _means(view: StudyView, level: object) -> Floats:
     return nan_mean(person_means(curve), axis=0)
 
 
-_FEWEST = 2
+_MIN_PERSONS = 2
 
 
 def spread_table(view: StudyView) -> CellTable | None:
     """Spread between and within persons, in the panel that the answer speaks of."""
-    if view.contrast is None or view.line is None or len(view.part.trials) < _FEWEST:
+    if view.contrast is None or view.line is None or len(view.part.trials) < _MIN_PERSONS:
         return None
     panel = view.panels[0]
     values = view.values

@@ -121,7 +121,7 @@ def cell_table(
 def _constant(table: CellTable) -> list[int]:
     """Return columns of which every row says the same; of a single row, none."""
     columns = range(table.labels, len(table.heads))
-    if len(table.rows) < _FEWEST_ROWS:
+    if len(table.rows) < _MIN_ROWS:
         return []
     return [n for n in columns if len({row[n] for row in table.rows}) == 1]
 
@@ -135,7 +135,7 @@ def _without_constants(table: CellTable) -> CellTable:
 
 
 _Column = tuple[str, list[str]]
-_FEWEST_ROWS = 3  # with fewer, a column that does not vary says little
+_MIN_ROWS = 3  # with fewer, a column that does not vary says little
 _MARK = "\N{NO-BREAK SPACE}†"
 
 

@@ -14,7 +14,7 @@ from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.kernel.wording import listing, quantity
 from dva_sim.simulation.labels import factor_name, level_name
 
-NEVER = "never"
+NEVER_TEXT = "never"
 WORST = "worst of these"
 
 
@@ -117,7 +117,7 @@ def facts_of(choice_map: ChoiceMap) -> dict[str, Any]:
         "smallest": quantity(choice_map.smallest, choice_map.unit) if choice_map.smallest else "",
         "has_waiting": choice_map.waiting is not None,
         "cut_off": quantity(choice_map.most, choice_map.unit) if choice_map.never.any() else "",
-        "never": NEVER,
+        "never": NEVER_TEXT,
     }
 
 
@@ -133,7 +133,7 @@ def regret_text(choice_map: ChoiceMap, situation: int, choice: int) -> str:
     `=`: as good as any; `0.0 to 9 ?`: too few drives to tell.
     """
     if choice_map.never[situation, choice].all():
-        return NEVER
+        return NEVER_TEXT
     if choice_map.is_best[situation, choice]:
         return "="
     low = choice_map.least[situation, choice]
@@ -190,12 +190,12 @@ def lead_of(choice_map: ChoiceMap) -> str:
 def _cost(choice_map: ChoiceMap, choice: int) -> str:
     """Return `14.6 s`: the most that a choice costs beyond the best one."""
     worst = float(choice_map.overall[choice])
-    return f"{NEVER} finishes" if math.isinf(worst) else quantity(worst, choice_map.unit)
+    return f"{NEVER_TEXT} finishes" if math.isinf(worst) else quantity(worst, choice_map.unit)
 
 
 def _best(choice_map: ChoiceMap, situation: int) -> str:
     if choice_map.is_lost[situation]:
-        return NEVER
+        return NEVER_TEXT
     best = choice_map.best_of(situation)
     if len(best) == len(choice_map.choice.levels):
         is_settled = choice_map.is_best[situation].all()
@@ -206,5 +206,5 @@ def _best(choice_map: ChoiceMap, situation: int) -> str:
 def regret_number(value: float) -> str:
     """Format a regret, which has room for no more; infinite if another finishes runs alone."""
     if not math.isfinite(value):
-        return NEVER if math.isinf(value) else "–"
+        return NEVER_TEXT if math.isinf(value) else "–"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -32,7 +32,7 @@ _VERDICTS: dict[Verdict, str] = {
     "open": "? open",
     "not run": "– not run",
 }
-_LEAST_P = 0.001
+_MIN_P = 0.001
 
 
 def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellTable:
@@ -201,7 +201,7 @@ def _interval(interval: Interval | None, measure: str) -> str:
 def _p(value: float) -> str:
     if not math.isfinite(value):
         return "–"
-    return f"< {_LEAST_P:g}" if value < _LEAST_P else f"{value:.3f}"
+    return f"< {_MIN_P:g}" if value < _MIN_P else f"{value:.3f}"
 
 
 def _apart(compared: Compared, cluster: str, tests: int) -> str:

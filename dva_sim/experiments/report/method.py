@@ -21,7 +21,7 @@ from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.labels import level_name, measure_called, measure_name
 from dva_sim.statistics import VarianceReduction, band, variance_reduction
 
-_FEW = 6  # persons: with fewer nothing can be drawn again
+_MIN_RESAMPLED_PERSONS = 6  # persons: with fewer nothing can be drawn again
 
 
 def remarks(reading: Reading) -> list[str]:
@@ -93,7 +93,7 @@ def _usual(reading: Reading) -> list[str]:
         checked=CHECKED_IN_SHORT,
         alike=_alike(reading),
         adjusted=_adjusted(reading),
-        is_small=reading.persons < _FEW,
+        is_small=reading.persons < _MIN_RESAMPLED_PERSONS,
         has_points=POINT in study.get("factors", {}),
         has_reference=any(part.get("reference") for part in study.get("parts", {}).values()),
         awaits_confirmation="confirmed" in reading.runs and awaited == "confirmation",

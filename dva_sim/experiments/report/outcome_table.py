@@ -69,7 +69,7 @@ def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
         places = _places(endings, view, panels)
     rows = [
         [*map(_level, setting), str(ended.events), *map(_share, ended.shares.values())]
-        for panel, stop in places[:_MOST_PLACES]
+        for panel, stop in places[:_MAX_PLACES]
         for setting, ended in _rows(endings, view, panel, stop)
         if ended.events
     ]
@@ -81,11 +81,11 @@ def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
     heads = [*factors, "events", *(last if w == NOTHING else w for w in endings.ways)]
     where = setting(view.panels[0]) if panels == view.panels[:1] else ""
     facts = {"where": where, "has_drives": view.part.has("confirmed")}
-    text = note("endings", cluster=cluster, **facts, shown=_MOST_PLACES, places=len(places))
+    text = note("endings", cluster=cluster, **facts, shown=_MAX_PLACES, places=len(places))
     return CellTable(view.part.name, heads, len(factors), rows, note=text)
 
 
-_MOST_PLACES = 12
+_MAX_PLACES = 12
 
 
 def _places(

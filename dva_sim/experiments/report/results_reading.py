@@ -39,7 +39,7 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.simulation.labels import take_up
 
-_FEWEST_PAIRS = 4  # of which a correlation says anything
+_MIN_PAIRS = 4  # of which a correlation says anything
 
 
 class ResultsReading:
@@ -202,7 +202,7 @@ class ResultsReading:
             return None
         first, second = self.last_sides
         both = np.isfinite(first) & np.isfinite(second)
-        if both.sum() < _FEWEST_PAIRS:
+        if both.sum() < _MIN_PAIRS:
             return None
         correlation = statistics.pair_correlation(first[both], second[both])
         return correlation if np.isfinite(correlation) else None

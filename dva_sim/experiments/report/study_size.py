@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.experiments.analysis.sample_size import MOST_PERSONS, POWERS, Count, SizePlan
+from dva_sim.experiments.analysis.sample_size import MAX_PERSONS, POWERS, Count, SizePlan
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.experiments.study.parts import POINT
@@ -99,7 +99,11 @@ def plan_table(plans: Sequence[SizePlan], cluster: str) -> CellTable:
     heads = ["to show", "if the true difference is"]
     heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
     rows = [
-        [f"{p.name}: {p.what}", p.assumed, *(map(_count_text, p.counts) if p.counts else _NEVER)]
+        [
+            f"{p.name}: {p.what}",
+            p.assumed,
+            *(map(_count_text, p.counts) if p.counts else _NO_NUMBER),
+        ]
         for p in plans
     ]
     return CellTable("", heads, len(heads), rows, note=_assumes(plans, cluster))
@@ -114,7 +118,7 @@ def plan_lines(plans: Sequence[SizePlan], cluster: str) -> list[str]:
     return [*lines, _assumes(plans, cluster)] if plans else []
 
 
-_NEVER = ["no number: it is not true then"] * len(POWERS)
+_NO_NUMBER = ["no number: it is not true then"] * len(POWERS)
 
 
 def _line(plan: SizePlan, cluster: str) -> str:
@@ -132,7 +136,7 @@ def _count_text(count: Count) -> str:
 
 
 def _persons(count: float) -> str:
-    return f"{count:.0f}" if math.isfinite(count) else f"more than {MOST_PERSONS:,}"
+    return f"{count:.0f}" if math.isfinite(count) else f"more than {MAX_PERSONS:,}"
 
 
 def _assumes(plans: Sequence[SizePlan], cluster: str) -> str:

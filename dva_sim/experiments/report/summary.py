@@ -44,7 +44,7 @@ from dva_sim.kernel.wording import listing, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_called
 from dva_sim.statistics import band, quantile_interval
 
-_MOST_ERRORS = 3
+_MAX_ERRORS = 3
 ROBOT_SHARE = "robot_share"
 
 
@@ -184,7 +184,7 @@ class Reading(ResultsReading):
         lines = []
         if failures := self.results.failures:
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
-            first_errors = "; ".join(list(errors)[:_MOST_ERRORS])
+            first_errors = "; ".join(list(errors)[:_MAX_ERRORS])
             lines.append(
                 f"Runs that failed and are missing below: {len(failures)} ({first_errors})."
             )

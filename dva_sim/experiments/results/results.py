@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, ValidationError
 
-from dva_sim.experiments.study.designs import MOST_RUNS
+from dva_sim.experiments.study.designs import MAX_RUNS
 from dva_sim.experiments.study.parts import DESIGN, REPEATS, Level
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel.config import Config, Scalar, first_mistake
@@ -251,7 +251,7 @@ class _Cell(Config):
     """A configuration of a study."""
 
     part: str
-    cell: Annotated[int, Field(ge=-1, le=MOST_RUNS)]
+    cell: Annotated[int, Field(ge=-1, le=MAX_RUNS)]
     config: str
     levels: dict[str, Level]
 
@@ -292,7 +292,7 @@ class _Manifest(Config):
     set: list[str | tuple[str, Any]] = Field(default_factory=list)
     changes: dict[str, Any] = Field(default_factory=dict)
     cells: list[_Cell] = Field(default_factory=list)
-    runs: Annotated[int, Field(ge=0, le=MOST_RUNS)] = 0
+    runs: Annotated[int, Field(ge=0, le=MAX_RUNS)] = 0
     versions: dict[str, str | bool | None] = Field(default_factory=dict)
     stopped: dict[str, Scalar] | None = None
     failures: list[dict[str, Scalar]] = Field(default_factory=list)

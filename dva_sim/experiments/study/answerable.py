@@ -107,7 +107,7 @@ OF_BANDS: Final[dict[int, Coverage]] = {
 """Coverage of a band over six independent levels, by number of persons."""
 OF_STOPPING: Final[Coverage] = (0.932, 0.893)
 """Coverage of an interval that ends a study by its width, with looks every 12 persons to 240."""
-ENOUGH: Final = 24  # persons, from which on the loss of a band is not mentioned
+WELL_COVERED_PERSONS: Final = 24  # persons, from which on the loss of a band is not mentioned
 
 
 def coverage_remarks(study: Study) -> Iterator[str]:
@@ -126,7 +126,7 @@ def coverage_remarks(study: Study) -> Iterator[str]:
 
 def of_few_persons(persons: int) -> str:
     """Describe the coverage of a band of a few persons; empty with enough."""
-    if persons >= ENOUGH:
+    if persons >= WELL_COVERED_PERSONS:
         return ""
     tabulated = max((count for count in OF_BANDS if count <= persons), default=min(OF_BANDS))
     beyond = min(count for count in OF_BANDS if count > tabulated)

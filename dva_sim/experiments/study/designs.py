@@ -30,13 +30,13 @@ from dva_sim.experiments.study.parts import (
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
-from dva_sim.kernel.yaml_files import MOST_VALUES, Document, KeyPath, parse_scalar, read_text
+from dva_sim.kernel.yaml_files import MAX_VALUES, Document, KeyPath, parse_scalar, read_text
 
 Row = dict[str, Level]
 
-MOST_POINTS = 2**16
-MOST_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
-MOST_RUNS = 1_000_000  # whose list takes a gigabyte, and whose runs take days of CPU time
+MAX_POINTS = 2**16
+MAX_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
+MAX_RUNS = 1_000_000  # whose list takes a gigabyte, and whose runs take days of CPU time
 
 
 class ValueRange(Config):
@@ -84,7 +84,7 @@ Ranges = dict[
         BeforeValidator(_spelled_out, json_schema_input_type=ValueRange | tuple[float, float]),
     ],
 ]
-Points = Annotated[int, Field(ge=2, le=MOST_POINTS)]
+Points = Annotated[int, Field(ge=2, le=MAX_POINTS)]
 Dyadic = Annotated[
     Points,
     AfterValidator(_power_of_two),
@@ -157,7 +157,7 @@ def all_factors(
     if design.is_sampled:
         return {POINT: tuple(range(design.points)), **declared}
     levels = {key: tuple(dict.fromkeys(row[key] for row in rows)) for key in rows[0]}
-    if math.prod(map(len, levels.values())) > MOST_CELLS:
+    if math.prod(map(len, levels.values())) > MAX_CELLS:
         return {POINT: tuple(range(len(rows))), **declared}
     return {**levels, **declared}
 
@@ -232,8 +232,8 @@ def read_table(path: Path) -> Document:
         if len(cells) != len(header):
             problem = f"row should have {len(header)} cells as the header has, not {len(cells)}"
             raise ConfigError(problem, path, number, 1)
-        if len(places) > MOST_VALUES:
-            raise ConfigError(f"has more than {MOST_VALUES} values", path, number, 1)
+        if len(places) > MAX_VALUES:
+            raise ConfigError(f"has more than {MAX_VALUES} values", path, number, 1)
         places[ROWS, len(rows)] = (number, 1)
         row: dict[str, Level] = {}
         for key, text, start in zip(header, cells, starts, strict=True):

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from dva_sim.experiments.study.designs import MOST_CELLS, MOST_POINTS, MOST_RUNS, keys_of
+from dva_sim.experiments.study.designs import MAX_CELLS, MAX_POINTS, MAX_RUNS, keys_of
 from dva_sim.experiments.study.factor_levels import factors_in_rows, path_in_design, runs_of, size
 from dva_sim.experiments.study.parts import (
     ANSWER,
@@ -28,7 +28,7 @@ from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import KeyPath
 from dva_sim.simulation.models import measured_names
 
-SAME = 1e-9  # relative difference of two levels that are meant as one
+SAME_LEVEL_TOLERANCE = 1e-9  # relative difference of two levels that are meant as one
 Problem = tuple[str, KeyPath]
 """Description of a problem, and the key it is reported at."""
 
@@ -124,7 +124,7 @@ def _faults_of_numbers(study: Study, factor: str, levels: Sequence[Level]) -> It
     """Levels that differ by rounding alone, as `numpy.arange` makes them, would share no row."""
     numbers = {n for n in levels if isinstance(n, int | float) and not isinstance(n, bool)}
     for low, high in itertools.pairwise(sorted(numbers)):
-        if math.isclose(low, high, rel_tol=SAME):
+        if math.isclose(low, high, rel_tol=SAME_LEVEL_TOLERANCE):
             text = f"{low!r} and {high!r} are one level of {factor!r}, written twice"
             yield text, _place(study, factor, high)
 
@@ -141,16 +141,16 @@ def of_size(study: Study) -> Iterator[Problem]:
     """Yield a slip in a grid, or in how many persons there are, would take years to run."""
     count = size(study)
     has_points = POINT in study.factors
-    most = MOST_POINTS if has_points else MOST_CELLS
+    most = MAX_POINTS if has_points else MAX_CELLS
     if count > most:
         how = "points or levels" if has_points else "levels, or draw points with 'design'"
         problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
         yield problem, ("design",) if has_points else ("factors",)
-    elif (runs := runs_of(study)) > MOST_RUNS:
+    elif (runs := runs_of(study)) > MAX_RUNS:
         key = "most_persons" if study.most_persons > study.persons else "persons"
         is_trials = study.replications > study.most_persons
         path: KeyPath = ("stop", key) if key == "most_persons" else (key,)
-        problem = f"there would be {runs:,} runs, more than {MOST_RUNS:,}"
+        problem = f"there would be {runs:,} runs, more than {MAX_RUNS:,}"
         fewer = "have fewer persons, replications or levels"
         yield f"{problem}; {fewer}", ("replications",) if is_trials else path
 

@@ -27,7 +27,7 @@ FORWARDER_PRIORITY = 20  # real-time, above the programs'
 NEAR = "near"
 FAR = "far"
 _LARGEST = 65_536
-_MOST_AT_ONCE = 32  # packets of one device before what is due is looked at again
+_MAX_AT_ONCE = 32  # packets of one device before what is due is looked at again
 _VERSION_4 = 4
 
 Links = tuple[Link, Link]
@@ -158,7 +158,7 @@ class Forwarder(EmulatedLink[int]):
         """Offer what waits in a device to its link; what is not IPv4 is not forwarded."""
         flow, out = self._ways[tun]
         with suppress(OSError):  # nothing waits, or the namespace has just ended
-            for _ in range(_MOST_AT_ONCE):
+            for _ in range(_MAX_AT_ONCE):
                 packet = os.read(tun, _LARGEST)
                 if not packet or packet[0] >> 4 != _VERSION_4:
                     continue

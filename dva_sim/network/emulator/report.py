@@ -13,7 +13,7 @@ from dva_sim.network.link import Link
 LATE_S = 0.005
 """A forwarder whose 99th percentile of lateness is above this has disturbed the run [s]."""
 
-_LEAST_S = 1e-6
+_MIN_DURATION_S = 1e-6
 _STEP = math.log(1.01)
 
 
@@ -26,7 +26,9 @@ class Durations:
 
     def add(self, duration: float) -> None:
         """Count one [s]."""
-        self._counts[math.ceil(math.log(max(duration, _LEAST_S) / _LEAST_S) / _STEP)] += 1
+        self._counts[
+            math.ceil(math.log(max(duration, _MIN_DURATION_S) / _MIN_DURATION_S) / _STEP)
+        ] += 1
         if not duration <= self.longest_s:
             self.longest_s = duration
 
@@ -36,7 +38,7 @@ class Durations:
         for step in sorted(self._counts):
             left -= self._counts[step]
             if left <= 0:
-                return min(self.longest_s, _LEAST_S * math.exp(step * _STEP))
+                return min(self.longest_s, _MIN_DURATION_S * math.exp(step * _STEP))
         return math.nan
 
 

@@ -20,7 +20,7 @@ _REPLY: Final = re.compile(
 )
 _NO_REPLY: Final = re.compile(r"\[\d+\.?\d*\] .*\bicmp_seq=(\d+)\b")
 _BEGIN: Final = "PING "  # the first line of each run of ping
-_AROUND: Final = ("--- ", "rtt ")  # lines of its summary
+_SUMMARY_STARTS: Final = ("--- ", "rtt ")  # lines of its summary
 _SUMMARY: Final = re.compile(r"\d+ packets transmitted")
 _NUMBERS: Final = 65536  # ping counts its requests with 16 bits
 _SAME_S: Final = 0.01  # replies to one request agree this well on when it was sent
@@ -264,7 +264,7 @@ def _ping_output(path: str, lines: list[tuple[int, str]]) -> DelayLog:
     """Requests by number; a second reply to the same request is left out."""
     runs = [_Run()]
     for line, text in lines:
-        if text.startswith(_AROUND) or _SUMMARY.match(text):
+        if text.startswith(_SUMMARY_STARTS) or _SUMMARY.match(text):
             continue
         if text.startswith(_BEGIN):
             runs.append(_Run())

@@ -28,7 +28,7 @@ from dva_sim.network.link.recorded import read_trace
 from dva_sim.network.link.replay import Replay, period_of
 from dva_sim.network.link.time_noise import FastNoise, MakeNumbers, PacketNumbers
 
-SMALLEST_PACKET = 40  # IPv4 and TCP headers alone [B]
+MIN_PACKET = 40  # IPv4 and TCP headers alone [B]
 
 
 class Link:
@@ -76,7 +76,7 @@ class Link:
         self._direction = direction
         if way.queue_packets is not None:
             serialiser = PacketQueue(serialiser, way.queue_packets)
-            self.room = way.queue_packets * SMALLEST_PACKET
+            self.room = way.queue_packets * MIN_PACKET
         self._serialiser = serialiser
         self._offer = serialiser.offer
         self._counts_packets = way.queue_packets is not None

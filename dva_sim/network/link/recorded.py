@@ -16,7 +16,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.read_once import read_once
 
 Floats = NDArray[np.float64]
-_LONGEST_S = 60.0
+_MAX_DURATION_S = 60.0
 _RATE = re.compile(r'"bits_per_second"\s*:\s*([\d.eE+-]+)')
 _ROUND_TRIP = re.compile(r'"rtt"\s*:\s*(\d+)')
 
@@ -69,8 +69,10 @@ def read_delays(path: str) -> tuple[float, ...]:
 def parse_delay(text: str, path: str, line: int, unit: str = "ms", scale: float = 1e-3) -> float:
     """Return a delay [s] from a number in some unit of `scale` seconds."""
     delay = parse_number(text, f"a delay [{unit}]", path, line) * scale
-    if not 0 <= delay <= _LONGEST_S:
-        problem = f"a delay should be between 0 and {_LONGEST_S / scale:g} {unit}, not {text[:20]}"
+    if not 0 <= delay <= _MAX_DURATION_S:
+        problem = (
+            f"a delay should be between 0 and {_MAX_DURATION_S / scale:g} {unit}, not {text[:20]}"
+        )
         raise ConfigError(problem, path, line, 1)
     return delay
 

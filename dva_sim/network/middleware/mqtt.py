@@ -36,7 +36,9 @@ _SYSTEM: Final = os.pathsep.join(
 PROGRAM: Final = shutil.which("mosquitto", path=_SYSTEM) or "mosquitto"
 COMMANDS = "command"
 PICTURES = "picture"
-HERE: Final = "robot"  # where the robot's end says that it hears commands; the broker keeps it
+ROBOT_TOPIC: Final = (
+    "robot"  # where the robot's end says that it hears commands; the broker keeps it
+)
 _AGAIN: Final = 0.1  # between two attempts to connect [s]
 
 
@@ -118,17 +120,17 @@ class _MqttEnd(TransportEnd):
     def _on_connect(self, client: Client, *_: Any) -> None:
         """Subscribe, also after a connection that was lost."""
         topics = [(self._hears, self._options.qos)]
-        client.subscribe([*topics, (HERE, 1)] if self._is_near else topics)
+        client.subscribe([*topics, (ROBOT_TOPIC, 1)] if self._is_near else topics)
 
     def _on_message(self, _: Client, __: Any, message: Any) -> None:
-        if message.topic == HERE:
+        if message.topic == ROBOT_TOPIC:
             self._is_ready.set()
         else:
             self._receive(message.payload)
 
     def _on_subscribe(self, client: Client, *_: Any) -> None:
         if not self._is_near:
-            client.publish(HERE, b"here", 1, retain=True)
+            client.publish(ROBOT_TOPIC, b"here", 1, retain=True)
             self._is_ready.set()
 
     def connect(self, place: Rendezvous) -> None:

@@ -25,7 +25,7 @@ from dva_sim.network.middleware.event_loop import LoopEnd
 if TYPE_CHECKING:
     from aiortc import RTCDataChannel, RTCPeerConnection
 
-MOST_WAITING: Final = 1_000_000  # bytes that may wait in the program before nothing more is taken
+MAX_WAITING: Final = 1_000_000  # bytes that may wait in the program before nothing more is taken
 
 
 class WebRtcTransport(CommandTransport):
@@ -79,7 +79,7 @@ class _WebRtcEnd(LoopEnd):
         channel = self._channel
         if channel is None or channel.readyState != "open":
             return False
-        if channel.bufferedAmount > MOST_WAITING:
+        if channel.bufferedAmount > MAX_WAITING:
             return False
         self.soon(channel.send, data)
         return True

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from websockets.asyncio.client import ClientConnection
     from websockets.asyncio.server import Server, ServerConnection
 
-MOST_WAITING = 64_000  # bytes that may wait in the program before nothing more is taken
+MAX_WAITING = 64_000  # bytes that may wait in the program before nothing more is taken
 
 
 class WebSocketTransport(CommandTransport):
@@ -71,7 +71,7 @@ class _WebSocketEnd(LoopEnd):
         connection = self._connection
         if connection is None or connection.transport.is_closing():
             return False
-        if connection.transport.get_write_buffer_size() > MOST_WAITING:
+        if connection.transport.get_write_buffer_size() > MAX_WAITING:
             return False
         self.begin(connection.send(data))
         return True

@@ -20,9 +20,9 @@ from dva_sim.network.tcp.retransmission_timer import RoundTrip, Timer
 from dva_sim.network.tcp.send_queue import SMALLEST
 
 FIRST_WINDOW = 65_160  # 45 full segments [B]
-LARGEST_WINDOW = 3_145_728  # half of tcp_rmem's third value [B]
+MAX_WINDOW = 3_145_728  # half of tcp_rmem's third value [B]
 QUICK = 16  # segments acknowledged at once at the start and after trouble
-LONGEST_DELAY = 0.2  # of an acknowledgement in a dialogue [s]
+MAX_DELAY = 0.2  # of an acknowledgement in a dialogue [s]
 BLOCKS = 3  # that fit beside time stamps
 
 
@@ -110,7 +110,7 @@ class Receiver:
         taken = min(count, self.next - self.read_to)
         self.read_to += taken
         if self._automatic:
-            self._window = min(self._window + taken, LARGEST_WINDOW)
+            self._window = min(self._window + taken, MAX_WINDOW)
         drained = self.pending and self.read_to == self.next
         pushed = self._pushed > (1 if self.dialogue else 0)
         if (drained and (pushed or self._has_full_one())) or self._reopened():
@@ -128,7 +128,7 @@ class Receiver:
 
     def wait(self, now: float) -> None:
         """Let the acknowledgement wait for something to ride on."""
-        longest = LONGEST_DELAY if self.dialogue else 0.5
+        longest = MAX_DELAY if self.dialogue else 0.5
         longest = min(longest, max(self._times.smoothed, self._options.delayed_ack))
         at = now + min(self._patience, longest)
         if at < self._timer.deadline:

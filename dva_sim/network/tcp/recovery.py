@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from dva_sim.network.tcp.congestion import RateReduction, Reno
 from dva_sim.network.tcp.parameters import TcpOptions
-from dva_sim.network.tcp.retransmission_timer import SOONEST_S, RoundTrip
+from dva_sim.network.tcp.retransmission_timer import MIN_TIMEOUT_S, RoundTrip
 from dva_sim.network.tcp.send_queue import Scoreboard, SentSegment
 
 DUPLICATES = 3
@@ -270,7 +270,7 @@ class Recovery:
         if board.lost and self.state == OPEN:
             self._begin(RECOVERY, next_byte)
             self._reduction = RateReduction(self._window.reduce(now), len(board.queue))
-        return now + wait + SOONEST_S if wait else 0.0
+        return now + wait + MIN_TIMEOUT_S if wait else 0.0
 
     def hold(self, delivered: int, whole: bool) -> bool:
         """Keep the congestion window down while recovering; returns whether it does.

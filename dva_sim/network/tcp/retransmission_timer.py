@@ -174,7 +174,7 @@ def next_on_grid(now: float, wait: float, tick: float) -> float:
     return (due // step + 1) * step * tick
 
 
-SOONEST_S = 0.002
+MIN_TIMEOUT_S = 0.002
 """Time that Linux adds to the waits for a probe and for a segment in doubt (TCP_TIMEOUT_MIN)."""
 TIMEOUT = "timeout"
 PROBE = "probe"
@@ -280,5 +280,5 @@ class Alarm:
         """Return the delay by RFC 8985, section 7.2; one segment may meet a delayed answer."""
         if not self._times.smoothed:
             return self._options.first_rto
-        patience = self._options.min_rto if segments == 1 else SOONEST_S
+        patience = self._options.min_rto if segments == 1 else MIN_TIMEOUT_S
         return 2 * self._times.smoothed + patience

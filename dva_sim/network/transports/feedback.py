@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 
 REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
 FIRST_TIMEOUT = 1.0  # [s]: RFC 6298
-LEAST_TIMEOUT = 1.0  # [s]: RFC 6298
-LONGEST_TIMEOUT = 60.0  # [s]: RFC 6298
+MIN_TIMEOUT = 1.0  # [s]: RFC 6298
+MAX_TIMEOUT = 60.0  # [s]: RFC 6298
 REPEATED = 32  # datagrams that an acknowledgement tells of: the bits of a word; assumed
 Echo = tuple[int, float]  # a datagram's number, and since when it had been there [s]
 
@@ -37,9 +37,9 @@ class RoundTrips:
     def timeout(self) -> float:
         """Time to wait for feedback before giving up [s]."""
         if self.smoothed is None:
-            return min(FIRST_TIMEOUT * self._backoff, LONGEST_TIMEOUT)
-        plain = max(self.smoothed + 4.0 * self._variation, LEAST_TIMEOUT)
-        return min(plain * self._backoff, LONGEST_TIMEOUT)
+            return min(FIRST_TIMEOUT * self._backoff, MAX_TIMEOUT)
+        plain = max(self.smoothed + 4.0 * self._variation, MIN_TIMEOUT)
+        return min(plain * self._backoff, MAX_TIMEOUT)
 
     def add(self, sample: float) -> None:
         """Learn from a round trip [s]."""

@@ -17,7 +17,7 @@ from matplotlib.path import Path
 
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import BYSTANDER, ROBOT
-from dva_sim.recordings.pictures.moments import FRESH, Moments, kind_of
+from dva_sim.recordings.pictures.moments import FRESH_FOR_S, Moments, kind_of
 
 LARGER = 1.25  # bodies are drawn a little larger than they are
 
@@ -119,7 +119,7 @@ class _Ghost:
 
     def show(self, time: float) -> list[Artist]:
         index = bisect_right(self._times, time) - 1
-        if index < 0 or time - self._times[index] > FRESH:
+        if index < 0 or time - self._times[index] > FRESH_FOR_S:
             return []
         seen = self._views[index]
         heading = math.degrees(seen.heading)

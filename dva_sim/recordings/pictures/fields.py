@@ -21,12 +21,12 @@ LAYER = 2.2  # over the floors, under walls and names
 STAR = 12  # size of the mark of a source [points]
 MARK = 8  # size of the mark of a source [points]
 CELL = 0.25  # of the fields [m]
-MOST_CELLS = 120_000  # of a field; on a larger site cells are larger
+MAX_CELLS = 120_000  # of a field; on a larger site cells are larger
 SMOKE_PATH = 2.5  # smoke covers the floor as it does a thing so far away [m]
 THICKEST = 0.58  # so much of the floor does smoke cover at most
 DEEP = 0.15  # from this depth water has its full colour [m]
-WET = 0.002  # less is not drawn [m]
-LEAST_HEAT = 1.0  # less is not drawn [kW/m2]
+DRAWN_DEPTH_M = 0.002  # less is not drawn [m]
+MIN_HEAT = 1.0  # less is not drawn [kW/m2]
 
 
 class DrawnFields:
@@ -41,7 +41,7 @@ class DrawnFields:
         self._ax = ax
         self._moments = moments
         west, south, east, north = moments.recording.site.extent
-        self._cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
+        self._cell = max(CELL, ((east - west) * (north - south) / MAX_CELLS) ** 0.5)
         # Of several gases the one that explodes first counts.
         limits = [incident.hazard.explodes_at() for incident in moments.recording.incidents]
         lower = min(1.0, *limits)
@@ -153,7 +153,7 @@ def _smoke(extinction: NDArray[Any]) -> NDArray[Any]:
 
 def _water(depth: NDArray[Any]) -> NDArray[Any]:
     deep = np.clip(depth / DEEP, 0.0, 1.0)
-    return _tinted(colours.WATER, np.where(depth > WET, 0.25 + 0.5 * deep, 0.0))
+    return _tinted(colours.WATER, np.where(depth > DRAWN_DEPTH_M, 0.25 + 0.5 * deep, 0.0))
 
 
 def _gas(share: NDArray[Any]) -> NDArray[Any]:
@@ -164,7 +164,7 @@ def _gas(share: NDArray[Any]) -> NDArray[Any]:
 
 def _heat(flux: NDArray[Any]) -> NDArray[Any]:
     """Return colours from yellow to red as it gets hotter."""
-    strong = np.clip(np.log10(np.maximum(flux, LEAST_HEAT) / LEAST_HEAT) / 1.5, 0.0, 1.0)
+    strong = np.clip(np.log10(np.maximum(flux, MIN_HEAT) / MIN_HEAT) / 1.5, 0.0, 1.0)
     picture = _tinted(colours.FIRE, 0.55 * np.sqrt(strong))
     picture[..., 1] += (1 - strong) * 0.5
     return picture

@@ -27,7 +27,7 @@ DPI = 100
 TRAFFIC = 0.8  # height of what is below maps, without a camera's picture
 EYE = 1.5  # height of what is below maps, with a camera's picture
 # What is there: its place from the left and from the top, its width and height, as shares.
-ALONE = (0.18, 0.0, 0.79, 0.68)
+SINGLE_VIEW = (0.18, 0.0, 0.79, 0.68)
 STRIP = (0.62, 0.12, 0.35, 0.65)
 SCREEN = (0.02, 0.12, 0.4, 0.84)
 
@@ -55,7 +55,9 @@ class Film:
         for column, (run, end) in enumerate(zip(runs, verdicts(recordings), strict=True)):
             title = sheet.title or pattern_name(run.recording)
             scenes.append(Scene(sheet.maps[column], run, end, title))
-            self._parts.append(Traffic(sheet.below(column, *(STRIP if inset else ALONE)), run))
+            self._parts.append(
+                Traffic(sheet.below(column, *(STRIP if inset else SINGLE_VIEW)), run)
+            )
             if inset:
                 eye = sheet.below(column, *SCREEN)
                 self._parts.append(_Eye(eye, run, self.speed / GLANCES))

@@ -21,7 +21,7 @@ from dva_sim.recordings.pictures.film import FPS, Film
 COLOURS = 112  # of a GIF
 
 
-ALIKE = 8  # a colour that differs less from the last picture's stays as it was, of 255
+COLOUR_TOLERANCE = 8  # a colour that differs less from the last picture's stays as it was, of 255
 
 
 SAMPLES = 6  # pictures that these are chosen from
@@ -82,7 +82,9 @@ def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
     previous = next(frames)
     yield previous
     for frame in frames:
-        red, green, blue = np.moveaxis(np.abs(frame.astype(np.int16) - previous) >= ALIKE, 2, 0)
+        red, green, blue = np.moveaxis(
+            np.abs(frame.astype(np.int16) - previous) >= COLOUR_TOLERANCE, 2, 0
+        )
         previous = np.where((red | green | blue)[:, :, None], frame, previous)
         yield previous
 

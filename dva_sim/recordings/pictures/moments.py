@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from typing import NamedTuple
 
-from dva_sim.agents.people.bystander import DOWN
+from dva_sim.agents.people.bystander import INCAPACITATED
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.kernel.suggestions import unknown
@@ -19,7 +19,7 @@ from dva_sim.worlds.geo import Pose
 
 GONE = 1.0  # so long after the end of the track of somebody who left [s]
 PERSON = 0.25  # radius of somebody on foot, seen from above [m]
-FRESH = 3.0  # an older picture is not looked at any more [s]
+FRESH_FOR_S = 3.0  # an older picture is not looked at any more [s]
 
 
 def kind_of(label: str) -> str:
@@ -154,7 +154,7 @@ class Moments:
             here.y,
             here.heading,
             number=int(number) if number.isdigit() else 1,
-            lying=here.mode == DOWN,
+            lying=here.mode == INCAPACITATED,
         )
 
 
@@ -163,4 +163,4 @@ def _shown(drive: DriveLog, time: float) -> float | None:
     if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
         return None
     frames = [frame for frame in drive.frames if frame.time <= time]
-    return frames[-1].captured if frames and time - frames[-1].time < FRESH else None
+    return frames[-1].captured if frames and time - frames[-1].time < FRESH_FOR_S else None

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.full import Playback
 
-SAME = 0.05  # a shorter lead is none, as times are told [s]
+TIE_S = 0.05  # a shorter lead is none, as times are told [s]
 
 
 class RunVerdict(NamedTuple):
@@ -33,7 +33,7 @@ class RunVerdict(NamedTuple):
         """The words, with the lead if there is one."""
         if self.ahead == math.inf:
             return f"{self.text}, the other not at all"
-        return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > SAME else self.text
+        return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > TIE_S else self.text
 
 
 def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:

@@ -68,7 +68,9 @@ class Scene:
         """Return the site; the limits of what is seen."""
         ax = self._ax
         site = self._moments.recording.site
-        draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
+        draw_site(
+            ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.MIN_NAME_POINTS
+        )
         # What hazards must not cover is drawn after them.
         self._upper: list[Any] = [
             artist
@@ -153,7 +155,7 @@ def _colour_of(verdict: RunVerdict) -> str:
     """Return the colour of the box with a run's outcome."""
     if not verdict.good:
         return style.FAILED
-    return style.BEHIND if verdict.ahead < 0 else style.AHEAD
+    return style.BEHIND_COLOUR if verdict.ahead < 0 else style.AHEAD_COLOUR
 
 
 def _newest_line(timeline: Sequence[Moment], time: float) -> str:

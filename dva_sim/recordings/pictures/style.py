@@ -30,12 +30,12 @@ GHOST = "#e07a00"
 WIDTH = 8.4  # of a picture [in]: a page shows 840 pixels of it
 FONT = 8.0  # of labels [points]: 11 pixels on such a page
 TITLE = 10.0  # [points]
-LEAST = 6.5  # of names on the ground [points]: 9 pixels on such a page
+MIN_NAME_POINTS = 6.5  # of names on the ground [points]: 9 pixels on such a page
 ROOMY = 10.0  # from this scale on a map has room for small marks [points/m]
-AHEAD = "#1b7a3d"
-BEHIND = "#59606a"
+AHEAD_COLOUR = "#1b7a3d"
+BEHIND_COLOUR = "#59606a"
 FAILED = "#a03030"
-ENDS = (AHEAD, BEHIND, FAILED)  # how a run ended
+ENDS = (AHEAD_COLOUR, BEHIND_COLOUR, FAILED)  # how a run ended
 SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # diameters, however large the site [points]
 TRAIL_S = 40.0  # a trail's colour falls to a third in that time [s]
 

@@ -15,7 +15,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
 from dva_sim.simulation.full.dva_server import DvaAgent
 
-MOST_ROWS: Final = 200  # of the table; more are read by nobody
+MAX_ROWS: Final = 200  # of the table; more are read by nobody
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +59,9 @@ class DeviceTable:
         self._beats: dict[str, Rate] = {}
 
     def rows(self) -> list[BookedDevice]:
-        """Return up to `MOST_ROWS` devices, silent ones last; call it once a second."""
+        """Return up to `MAX_ROWS` devices, silent ones last; call it once a second."""
         entries = self._dva().core.registry.entries
-        first = islice(sorted(entries, key=lambda i: entries[i].silent), MOST_ROWS)
+        first = islice(sorted(entries, key=lambda i: entries[i].silent), MAX_ROWS)
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
         return [self._row(i, entries[i]) for i in self._beats]
 

@@ -19,7 +19,7 @@ from dva_sim.agents.device import (
     do_nothing,
 )
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.core.audit import MOST_KEPT
+from dva_sim.core.audit import MAX_KEPT
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.registry import BURST, RATE, RegistrationLimit
@@ -32,9 +32,9 @@ from dva_sim.protocol.codec import decode, decode_if_valid
 from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.facts import Fact
 
-MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
+MAX_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
-MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
+MAX_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
 TICK = 1.0  # how often the core looks at deadlines [s]
 NOTHING_TO_KEEP: Final = (
     *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo, m.RobotEmergency),
@@ -78,7 +78,7 @@ class DvaAgent:
         self.core = core
         self.events: dict[int, Event] = {}
         self.copies: set[int] = set()
-        self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
+        self.facts: deque[Fact] = deque(maxlen=None if keep_events else MAX_KEPT)
         self.on_fact: Callable[[Fact], object] = do_nothing
         self._asks = core.dispatcher.questions.asks
         self._memory = memory
@@ -244,7 +244,7 @@ class DvaAgent:
         if key not in self._turned_away:
             self._turned_away[key] = None
             self.device.tell(f"does not register {source} at {wish.address}: {why}", "link")
-        if len(self._turned_away) > MOST_TURNED_AWAY:
+        if len(self._turned_away) > MAX_TURNED_AWAY:
             self._turned_away.popitem(last=False)
 
     def _attend(self) -> None:
@@ -400,7 +400,7 @@ class DvaAgent:
         if self._last_reported.get(event.number) is event.state:
             return
         self._last_reported[event.number] = event.state
-        if len(self._last_reported) > MOST_REPORTED:
+        if len(self._last_reported) > MAX_REPORTED:
             del self._last_reported[next(iter(self._last_reported))]
         text = f"event {event.number} ({event.kind}) is {event.state}"
         if event.state is State.ASSIGNED and event.holder:

@@ -28,13 +28,13 @@ INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
 RETURNED_WITHIN = 8.0  # a DVA of regions has its events back from its deputy [s]
-TOGETHER = 20.0  # two deaths of DVAs within that are at once: copies take a while [s]
+SIMULTANEOUS_S = 20.0  # two deaths of DVAs within that are at once: copies take a while [s]
 HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
 STIRRED = 0.25  # who has moved less has not moved: half of the DVA's own limit [m]
-MOVED = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
+MAX_MOVE_M = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 UNREPLICATED: Final = "unreplicated"  # said of a report that the deputy may not have
-MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
+MAX_KEPT = 1000  # reports and orders that wait for an answer, and events
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
 IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
@@ -310,7 +310,7 @@ class EventLedger:
         if report is not None and reply.code == m.OK:
             self._taken.append(report)
             self._unreplicated += [report] if reply.text == UNREPLICATED else []
-            del self._unreplicated[:-MOST_KEPT]
+            del self._unreplicated[:-MAX_KEPT]
 
     # --- what the book shows -------------------------------------------------------------
 
@@ -374,7 +374,7 @@ class EventLedger:
         for number in before_by_number.keys() & self._open.keys():
             kind, place = self._open[number]
             was, before = before_by_number[number]
-            if kind != was or (place != before and apart(place, before) > MOVED):
+            if kind != was or (place != before and apart(place, before) > MAX_MOVE_M):
                 yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*events.open.values(), *events.closed.values())
         seen = self._seen
@@ -396,7 +396,7 @@ class EventLedger:
         for number in [n for n in self._open if n not in self._promised]:
             event = events.open.get(number)
             kind, place = self._open[number]
-            if event is None or event.kind != kind or apart(event.position, place) > MOVED:
+            if event is None or event.kind != kind or apart(event.position, place) > MAX_MOVE_M:
                 del self._open[number]
                 self._lost[number] = kind, place, self._words.pop(number, Word())
                 self._seen.pop(number, None)
@@ -405,7 +405,7 @@ class EventLedger:
     def _find_again(self, event: Event) -> None:
         """Count those sent to a lost event for a new one of its number, kind and place as well."""
         kind, place, word = self._lost.pop(event.number)
-        if event.kind == kind and apart(event.position, place) <= MOVED:
+        if event.kind == kind and apart(event.position, place) <= MAX_MOVE_M:
             new = self._word(event.number)
             new.ordered = word.ordered | new.ordered
             new.went |= word.went
@@ -464,7 +464,7 @@ class EventLedger:
             return True
         near = max(self._rules.merge_distance, SAME_SPOT)
         others = [book for book in self._books if book is not self]
-        if not all(book._worked_since(self._down_at - TOGETHER) for book in others):
+        if not all(book._worked_since(self._down_at - SIMULTANEOUS_S) for book in others):
             return True  # that a DVA and its deputy die at once is not promised to be harmless
         tables = [book._events for book in others]
         all_events: list[Event | m.EventReport] = [*self._unreplicated]
@@ -651,7 +651,7 @@ def _far(place: m.Position | None, other: m.Position | None) -> bool:
 
 
 def _keep_newest(table: dict[Any, Any]) -> None:
-    if len(table) > MOST_KEPT:
+    if len(table) > MAX_KEPT:
         del table[next(iter(table))]
 
 

@@ -18,7 +18,7 @@ from dva_sim.worlds.site_parts import Detector
 
 REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
 CLEARANCE = 0.7  # around the middle of a hazard, so that a robot can get near [m]
-FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
+MIN_BASE_DISTANCE_M = 6.0  # from every base, so that there is a way to go [m]
 TRIES = 200
 HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
 HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
@@ -150,7 +150,7 @@ def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[fl
         if not site.is_free(x, y, CLEARANCE):
             continue
         gap = min((math.dist((x, y), (b.x, b.y)) for b in bases), default=math.inf)
-        if event.room is not None or gap >= FAR_ENOUGH:
+        if event.room is not None or gap >= MIN_BASE_DISTANCE_M:
             return x, y
         if gap > farthest:
             farthest = gap

@@ -230,7 +230,7 @@ class Observer(Listener, Protocol):
         """Take a new mean time that a message takes a robot's computer [s]."""
 
 
-MOST_SENT = 50_000  # messages of which is known who has sent them
+MAX_SENT = 50_000  # messages of which is known who has sent them
 
 
 class Senders:
@@ -241,7 +241,7 @@ class Senders:
         most: So many messages are remembered; None: all.
     """
 
-    def __init__(self, is_ours: Callable[[str], bool], most: int | None = MOST_SENT) -> None:
+    def __init__(self, is_ours: Callable[[str], bool], most: int | None = MAX_SENT) -> None:
         self._is_ours = is_ours
         self._most = most
         self._sent: OrderedDict[tuple[str, int], None] = OrderedDict()
@@ -479,7 +479,7 @@ class FactLog:
 
 _OPEN = "open"
 _CLOSED = "closed"
-_BOTH = "both"
+_BOTH_KINDS = "both"
 
 
 def event_facts(event: Event, where: str) -> dict[str, Any]:
@@ -512,7 +512,7 @@ class _EventTableDiff:
         """Return the changes since the last page."""
         events = page.events
         changed = list[dict[str, Any]]()
-        every = [(e, _BOTH if n in events.closed else _OPEN) for n, e in events.open.items()]
+        every = [(e, _BOTH_KINDS if n in events.closed else _OPEN) for n, e in events.open.items()]
         every += [(e, _CLOSED) for n, e in events.closed.items() if n not in events.open]
         shown_events = self._events
         self._events = {}
@@ -584,7 +584,7 @@ class EventTableCopy:
             **{who: facts[who] for who in _SENT},
         )
         for where, events in ((_OPEN, self.events.open), (_CLOSED, self.events.closed)):
-            if facts["where"] in (where, _BOTH):
+            if facts["where"] in (where, _BOTH_KINDS):
                 events[number] = event
             else:
                 events.pop(number, None)

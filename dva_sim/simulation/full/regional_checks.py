@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from dva_sim.core.events import Event, State, apart
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode_if_valid
-from dva_sim.simulation.full.event_ledger import TOGETHER, UNREPLICATED
+from dva_sim.simulation.full.event_ledger import SIMULTANEOUS_S, UNREPLICATED
 from dva_sim.simulation.full.observations import Page, SafetyTerms
 
 OBEYS_WITHIN: Final = 5.0  # delay allowed between an order and its first effect [s]
@@ -25,8 +25,8 @@ SHOWN_WITHIN: Final = 5.0  # a DVA whose book was not seen for so long is dead [
 PASSED_WITHIN: Final = 0.9  # an event that was passed on is in the other book by then [s]
 GOES_ON_WITHIN: Final = 15.0  # after a take-over the events of the dead are open again [s]
 COMES_BACK_WITHIN: Final = 60.0  # after the end of an event those who were lent are free [s]
-MOVED: Final = 25.0  # an event that a robot has felt is moved to where it is seen [m]
-MOST_KEPT: Final = 1000
+MAX_MOVE_M: Final = 25.0  # an event that a robot has felt is moved to where it is seen [m]
+MAX_KEPT: Final = 1000
 
 CHECKED: Final = {
     "S12": "a device answers OK only to orders of the DVA that confirmed its newest registration; "
@@ -120,7 +120,7 @@ class RegionalRules:
         elif source in self.terms.dvas and isinstance(body, ORDERS):
             self._ordered[to, source, message.message_id] = Asked(now, self._obeys.get(to))
         for table in (self._registers, self._ordered, self._reported):
-            if len(table) > MOST_KEPT:
+            if len(table) > MAX_KEPT:
                 table.popitem(last=False)
 
     def sent(self, now: float, source: str, to: str, payload: bytes) -> Iterator[Broken]:
@@ -149,7 +149,7 @@ class RegionalRules:
                 is_kept = report is not None and text != UNREPLICATED
                 if report is not None and is_kept and report.finding == "detected":
                     self._promises.append(KeptReport(dva, report))
-                    del self._promises[:-MOST_KEPT]
+                    del self._promises[:-MAX_KEPT]
             case m.Replicate(event=event) if event.closed_for is not None:
                 self._promises = [p for p in self._promises if not _is_about(p.report, event)]
 
@@ -202,7 +202,7 @@ class RegionalRules:
             if now - since <= GOES_ON_WITHIN:
                 continue
             self._promises.remove(promise)
-            died = self._died.get(promise.dva, now) - TOGETHER
+            died = self._died.get(promise.dva, now) - SIMULTANEOUS_S
             if any(at > died for dva, at in self._down.items() if dva != promise.dva):
                 continue  # two deaths at once are not promised to be harmless
             fits = (e for e in dead.events.open.values() if _fits(e, promise.report, self._near))
@@ -302,5 +302,5 @@ def _fits(event: Event, report: m.EventReport, near: float) -> bool:
 
 
 def _is_about(report: m.EventReport, event: m.EventStatus) -> bool:
-    is_near = apart(report.position, event.position) < MOVED
+    is_near = apart(report.position, event.position) < MAX_MOVE_M
     return is_near and report.kind == event.kind

@@ -60,7 +60,7 @@ from dva_sim.simulation.scenario.parts import DvaDeath
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
 OTHERS_HZ = 20.0
 MESSAGE = 1000  # more than any but a picture takes, with all headers [B]
-TOGETHER = 10  # messages that may coincide with a picture; assumed
+COINCIDING_MESSAGES = 10  # messages that may coincide with a picture; assumed
 
 
 def load_of(scenario: Scenario) -> Load:
@@ -69,7 +69,7 @@ def load_of(scenario: Scenario) -> Load:
     picture = frame + -(-frame // MSS) * HEADERS
     messages = MESSAGE * (scenario.command.rate_hz + OTHERS_HZ)
     rate = 8.0 * (scenario.camera.rate_hz * picture + messages)
-    return Load(rate, picture + TOGETHER * MESSAGE)
+    return Load(rate, picture + COINCIDING_MESSAGES * MESSAGE)
 
 
 LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)

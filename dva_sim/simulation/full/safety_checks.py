@@ -44,8 +44,8 @@ LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the rob
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 TELLS_WITHIN = 2.0  # a stopped robot tells the DVA so each second [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
-MOST_COPIES = 8  # of one command, and registrations of a robot, that are told apart
-MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
+MAX_COPIES = 8  # of one command, and registrations of a robot, that are told apart
+MAX_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
 
 CHECKED: Final = {
     "S1": "a robot is asked to move, and moves, by a started drive's newest command that arrived "
@@ -212,13 +212,13 @@ class Witness:
     released_by: m.ReleasedBy | None = None
     emergency: int | None = None
     reported_at: float = -math.inf
-    questions: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
-    registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
+    questions: deque[int] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
+    registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
 
     def given(self, session: int, held: Held) -> None:
         """Note that the DVA gives a permission, or says that one holds."""
         self.sessions[session] = held
-        if len(self.sessions) > MOST_KEPT:
+        if len(self.sessions) > MAX_KEPT:
             forgotten, _ = self.sessions.popitem(last=False)
             self.over.pop(forgotten, None)
             self.confirmed.discard(forgotten)
@@ -364,7 +364,7 @@ class Witness:
         if key in self.done:
             return True
         self.done[key] = None
-        if len(self.done) > MOST_KEPT:
+        if len(self.done) > MAX_KEPT:
             self.done.popitem(last=False)
         return False
 
@@ -397,7 +397,7 @@ class SafetyAudit:
         self._asked_release: dict[tuple[str, str], float] = {}  # by robot and device: when last
         self._hears_dva = False
         self._told_stopped: dict[tuple[str, str], StopTold] = {}  # by DVA and robot
-        self._orders_sent: deque[int] = deque(maxlen=MOST_KEPT)  # hashes; each may be sent again
+        self._orders_sent: deque[int] = deque(maxlen=MAX_KEPT)  # hashes; each may be sent again
         self._dvas = frozenset(terms.dvas)
         self._obeys_within = OBEYS_WITHIN + 10 * terms.processing
         self._motion_of = motion_of
@@ -485,9 +485,9 @@ class SafetyAudit:
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
             # Whoever has restarted numbers from 1 again, and has other sessions.
-            copies = deque[float](maxlen=MOST_COPIES)
+            copies = deque[float](maxlen=MAX_COPIES)
             witness.arrivals.setdefault((*key, message.session), copies).append(now)
-            if len(witness.arrivals) > MOST_KEPT:
+            if len(witness.arrivals) > MAX_KEPT:
                 witness.arrivals.popitem(last=False)
             return
         witness.unanswered.setdefault(key, Unanswered(message, now, source))
@@ -507,7 +507,7 @@ class SafetyAudit:
             told.at = -math.inf
             told.released = told.tick
             self._asked_release[body.device, source] = now
-            if len(self._asked_release) > MOST_KEPT:
+            if len(self._asked_release) > MAX_KEPT:
                 del self._asked_release[next(iter(self._asked_release))]
 
     def _sends_stopped(self, dva: str, to: str, data: bytes, now: float) -> Iterator[Broken]:

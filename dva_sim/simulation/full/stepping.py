@@ -7,7 +7,7 @@ from typing import Literal
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator.held_robot import HeldRobot
-from dva_sim.agents.operator.person_at_console import THERE, PersonAgent
+from dva_sim.agents.operator.person_at_console import ARRIVED_WITHIN_M, PersonAgent
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
@@ -18,7 +18,7 @@ from dva_sim.simulation.scenario import Scenario
 
 Outcome = Literal["", "arrived", "lost"]
 
-PATIENCE = 60.0  # for the permission, the robot's answer and its first picture [s]
+PERMISSION_WAIT_S = 60.0  # for the permission, the robot's answer and its first picture [s]
 LOOK = 0.1  # between looks for them [s]
 
 
@@ -112,7 +112,7 @@ class SteppedDrive:
             return False
         dx = seen.x - self.goal[0]
         dy = seen.y - self.goal[1]
-        return dx * dx + dy * dy < THERE * THERE
+        return dx * dx + dy * dy < ARRIVED_WITHIN_M * ARRIVED_WITHIN_M
 
     def _begin_shift(self) -> None:
         self._is_known = True
@@ -124,8 +124,8 @@ class SteppedDrive:
         self._refusal = "" if done else text
 
     def _pass_until(self, reached: Callable[[], bool], otherwise: str) -> None:
-        end = self.now + PATIENCE
+        end = self.now + PERMISSION_WAIT_S
         while not reached():
             if self._refusal or self.now >= end:
-                raise ConfigError(self._refusal or f"{otherwise} within {PATIENCE:g} s")
+                raise ConfigError(self._refusal or f"{otherwise} within {PERMISSION_WAIT_S:g} s")
             self.run.clock.run(self.now + LOOK)

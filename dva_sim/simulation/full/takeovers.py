@@ -9,7 +9,7 @@ from dva_sim.core.handovers import STOP_WITHIN
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Right
 
-MOST_KEPT = 1000  # wishes that wait for an answer
+MAX_KEPT = 1000  # wishes that wait for an answer
 
 
 class Stopping(NamedTuple):
@@ -39,7 +39,7 @@ class Takeovers:
         body = message.body
         if isinstance(body, m.PermissionRequest) and body.takeover == "force":
             self._asked[source, message.message_id] = body.device
-            if len(self._asked) > MOST_KEPT:
+            if len(self._asked) > MAX_KEPT:
                 del self._asked[next(iter(self._asked))]
 
     @property

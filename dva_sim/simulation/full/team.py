@@ -40,13 +40,13 @@ from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.site import FOOTPRINT
 
 TRIES = 200
-APART = 1.5  # between the middles of two who begin [m]
+START_GAP_M = 1.5  # between the middles of two who begin [m]
 
 Point = tuple[float, float]
 WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
-WET = 0.002  # deeper water than this makes a floor slippery [m]
+SLIPPERY_DEPTH_M = 0.002  # deeper water than this makes a floor slippery [m]
 HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
-AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
+CHARGING_WITHIN_M = 0.5  # so near its base a robot that stands is charged [m]
 STANDING = 0.02  # slower than this it stands [m/s]
 PLACES = 3  # where a bystander works, by turns
 FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
@@ -167,7 +167,7 @@ class TeamBuilder:
                     f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
         if self._around.may_be_wet:
-            wet = self._around.at(body.x, body.y, now).water > WET
+            wet = self._around.at(body.x, body.y, now).water > SLIPPERY_DEPTH_M
             body.grip = WET_GRIP if wet else GRIP
 
     def add_guard(self, number: int) -> GuardAgent | PersonGuard:
@@ -319,7 +319,7 @@ class TeamBuilder:
 
     def _is_free(self, pose: Pose) -> bool:
         here = pose.x, pose.y
-        alone = all(math.dist(here, other) >= APART for other in self._taken)
+        alone = all(math.dist(here, other) >= START_GAP_M for other in self._taken)
         return alone and self._stage.site.is_free(*here, FOOTPRINT)
 
 
@@ -349,7 +349,7 @@ class Power:
         body = self._body
         if battery is None:
             return 1.0
-        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
+        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < CHARGING_WITHIN_M
         at_base = near and abs(body.speed) < STANDING
         battery.advance(self._clock.now, body.distance, body.work, at_base)
         return battery.share

@@ -40,7 +40,7 @@ _AT_THE_DVA: Final = ("S2", "S6")  # rules on messages that reach the DVA
 OF_MESSAGES: Final = tuple(sorted({*_AT_ROBOTS, *_AT_THE_DVA}))
 SETTLES: Final = OBEYS_WITHIN  # for which the facts of a gap may still have effects [s]
 EVENTS_UNKNOWN = "what the DVA's book showed is not known here"
-MOST_SPANS: Final = 3  # gaps that a verdict names
+MAX_SPANS: Final = 3  # gaps that a verdict names
 HELD = "held"
 BROKEN = "broken"
 NOT_JUDGED = "not judged"
@@ -263,9 +263,9 @@ def _lost(gaps: Sequence[o.FactGap]) -> str:
         f"from {gap.since:.1f} s on"
         if math.isinf(gap.time)
         else f"from {gap.since:.1f} s to {gap.time:.1f} s"
-        for gap in gaps[:MOST_SPANS]
+        for gap in gaps[:MAX_SPANS]
     )
-    more = f" and {len(gaps) - MOST_SPANS} more times" if len(gaps) > MOST_SPANS else ""
+    more = f" and {len(gaps) - MAX_SPANS} more times" if len(gaps) > MAX_SPANS else ""
     missing = sum(gap.missing for gap in gaps)
     return f"{spans}{more} {missing} facts could not be kept; held otherwise"
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from dva_sim.agents.people.bystander import DOWN
+from dva_sim.agents.people.bystander import INCAPACITATED
 from dva_sim.core.events import Event
 from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog
@@ -273,7 +273,7 @@ def _people_measures(recording: Recording) -> Row:
     row: Row = {
         "dose_heat_max": max(p.heat for p in people),
         "dose_toxic_max": max(p.toxic for p in people),
-        "incapacitated": sum(p.activity == DOWN for p in people),
+        "incapacitated": sum(p.activity == INCAPACITATED for p in people),
     }
     if bystanders:
         row["evacuated_share"] = len(out) / len(bystanders)

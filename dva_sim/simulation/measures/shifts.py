@@ -37,7 +37,7 @@ from dva_sim.statistics import Incidence, first_of, incidence
 FOLLOW_S = 600.0
 FATES = ("confirmed", "refuted", "escalated", "expired")
 PERCENTILES = (50, 90, 95)
-FEWEST_IN_ZONE = 3  # events without which a zone's mean says nothing
+MIN_IN_ZONE = 3  # events without which a zone's mean says nothing
 SLACK = 1e-6  # [s]
 
 _OF_CONTAINMENT = (
@@ -287,7 +287,7 @@ def zone_ratio(events: Columns, follow: float) -> float:
     means = [
         reaching(only(events, here), "response_s").restricted_mean(follow)
         for zone in sorted(set(events["zone"].tolist()))
-        if (here := events["zone"] == zone).sum() >= FEWEST_IN_ZONE
+        if (here := events["zone"] == zone).sum() >= MIN_IN_ZONE
     ]
     return max(means) / min(means) if len(means) > 1 and min(means) > 0 else math.nan
 

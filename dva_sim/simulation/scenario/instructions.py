@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 from dva_sim.kernel.errors import ConfigError
 
-MOST_LINES: Final = 64
-LONGEST_LINE: Final = 256  # characters
+MAX_LINES: Final = 64
+MAX_LINE: Final = 256  # characters
 _STEP: Final = re.compile(r"(?:[-*+]|\d{1,2}[.)])\s+(?:\[[ xX]?\]\s*)?(.*)")
 
 
@@ -44,12 +44,12 @@ def read_instructions(path: Path) -> tuple[Instruction, ...]:
         raise ConfigError(f"instructions {str(path)!r} cannot be read: {reason}") from None
     lines = [" ".join(line.split()) for line in text.splitlines()]
     instructions = tuple(_instruction(line) for line in lines if line)
-    if not instructions or len(instructions) > MOST_LINES:
+    if not instructions or len(instructions) > MAX_LINES:
         has = f"{len(instructions)} lines" if instructions else "no text"
-        raise ConfigError(f"instructions {str(path)!r} have {has}; 1 to {MOST_LINES} lines fit")
-    if any(len(line.text) > LONGEST_LINE for line in instructions):
+        raise ConfigError(f"instructions {str(path)!r} have {has}; 1 to {MAX_LINES} lines fit")
+    if any(len(line.text) > MAX_LINE for line in instructions):
         raise ConfigError(
-            f"instructions {str(path)!r} have a line of more than {LONGEST_LINE} characters"
+            f"instructions {str(path)!r} have a line of more than {MAX_LINE} characters"
         )
     return instructions
 

@@ -11,7 +11,7 @@ from dva_sim.simulation.scenario.scenario import (
 
 TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
 USUAL_S = 9.0  # time-out, where the link leaves time for an answer
-LONGEST_S = 120.0
+MAX_TIMEOUT_S = 120.0
 _ROOM = 1.25  # over what is needed, beyond the usual
 
 
@@ -21,7 +21,7 @@ def time_out_s(needed_s: float) -> float:
     Args:
         needed_s: Time that the first reply over a new connection takes [s].
     """
-    return USUAL_S if needed_s < USUAL_S else min(_ROOM * needed_s, LONGEST_S)
+    return USUAL_S if needed_s < USUAL_S else min(_ROOM * needed_s, MAX_TIMEOUT_S)
 
 
 def request_timeout_s(scenario: Scenario) -> float:

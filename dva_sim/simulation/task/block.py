@@ -33,7 +33,9 @@ from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, WayKept
 Floats = NDArray[np.float64]
 
 RUN_OUT = 2.0  # the way goes on so far beyond the end, so that nobody stops before it [m]
-WITHIN = 0.25  # of the tunnel one looks for one's place ahead of the last: laps lie on each other
+LAP_SHARE = (
+    0.25  # of the tunnel one looks for one's place ahead of the last: laps lie on each other
+)
 CORNERS = 60  # of the polygon that stands for the middle of a circle, for the person
 
 
@@ -54,7 +56,7 @@ class TunnelGoal(Goal):
         self.width = width
         self.tolerance = 0.5 * width
         self._radius = length / (2.0 * math.pi) if task.shape == "circular" else 0.0
-        self.path = Route(self._way(), min(REACH, WITHIN * length))
+        self.path = Route(self._way(), min(REACH, LAP_SHARE * length))
         self._kept = WayKept(self.tolerance)
         self._along = 0.0
         self._time = 0.0

@@ -17,7 +17,7 @@ from dva_sim.network.link import Link, make_serialiser
 from dva_sim.simulation.task.scenario import OneWayDelay
 
 T = TypeVar("T")
-EARLY = 1e-9  # what is due now comes now, whatever the rounding [s]
+ROUNDING_S = 1e-9  # what is due now comes now, whatever the rounding [s]
 SIZE = 100  # of a reading or frame [B]: the line is so fast that it does not matter
 
 
@@ -51,7 +51,7 @@ class Channel(Generic[T]):
     def take(self, now: float) -> list[T]:
         """Return everything that has arrived by `now` [s], oldest first."""
         queue = self._queue
-        due = now + EARLY
+        due = now + ROUNDING_S
         if not queue or queue[0][0] > due:
             return []
         out = []

@@ -37,7 +37,7 @@ from dva_sim.simulation.task.scenario import TaskScenario
 from dva_sim.simulation.task.tasks import Pointing, ReachTask
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
-MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
+MOVED_BY = 1e-3  # a cursor that has gone so far has moved [m]; assumed
 SUMMED = 0.1  # over so long vision sums motion before it tells a velocity [s]
 
 
@@ -259,7 +259,7 @@ class CursorTrial(Trial[Sighting]):
             command = 0.0, 0.0
         plant.step(command[0], 0.0 if goal.flat else command[1], dt)
         self.path += math.hypot(plant.vx, plant.vy) * dt
-        if self.moved_at is None and self.path > MOVED:
+        if self.moved_at is None and self.path > MOVED_BY:
             self.moved_at = now + dt
         self.over = goal.check(now + dt, plant.x, plant.y, dt)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from dva_sim.simulation.task.delays import EARLY, Channel, T
+from dva_sim.simulation.task.delays import ROUNDING_S, Channel, T
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class FrameStream:
 
     def delay_at(self, time: float) -> float:
         """Return the delay of the message made at `time` since the recording began [s]."""
-        return float(self.delays[math.floor(time / self.period + EARLY) % len(self.delays)])
+        return float(self.delays[math.floor(time / self.period + ROUNDING_S) % len(self.delays)])
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class RecordedChannel(Channel[T]):
     @override
     def take(self, now: float) -> list[T]:
         out = []
-        due = now + EARLY
+        due = now + ROUNDING_S
         while self._coming and self._coming[0][0] <= due:
             _, number, item = heapq.heappop(self._coming)
             if number > self._newest:

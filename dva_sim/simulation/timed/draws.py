@@ -16,7 +16,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.timed.distributions import Constant, Law
 
 BLOCK = 256
-KEPT = 8  # blocks; events are asked about roughly in their order
+KEPT_BLOCKS = 8  # blocks; events are asked about roughly in their order
 
 T = TypeVar("T")
 
@@ -49,7 +49,7 @@ class Draws(Generic[T]):
         return block[index % BLOCK]
 
     def _make(self, number: int) -> list[T]:
-        if len(self._blocks) >= KEPT:
+        if len(self._blocks) >= KEPT_BLOCKS:
             del self._blocks[next(iter(self._blocks))]
         rng = self._streams.fresh(f"{self._name}/{number}")
         block = self._blocks[number] = self._draw(rng, BLOCK)

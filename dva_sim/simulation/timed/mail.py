@@ -15,7 +15,7 @@ from dva_sim.protocol import messages as m
 TICK = 1.0  # how often the core looks by itself on a network [s]
 DVA = "02:00:00:00:00:01"
 NOON = "12:00:00"  # for people, who are not here to read it
-LEAST = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
+CLOCK_STEP_S = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
 
 
 class Taker(Protocol):
@@ -120,14 +120,14 @@ class Mail:
         """Be there at the next deadline."""
         due = min(self.core.next_deadline(), self._again)
         if due < self._due:
-            self._due = max(due, self._clock.now + LEAST)
+            self._due = max(due, self._clock.now + CLOCK_STEP_S)
             self._clock.call_at(self._due, self._on_due, self._due)
 
     def _on_due(self, due: float) -> None:
         if due != self._due:
             return  # an earlier one was found meanwhile, and looks for the next
         self._due = math.inf
-        now = self._clock.now + LEAST
+        now = self._clock.now + CLOCK_STEP_S
         if self.core.next_deadline() <= now or self._again <= now:
             self._again = math.inf
             self.tick()

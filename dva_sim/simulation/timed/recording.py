@@ -79,7 +79,7 @@ COUNT = 1
 SUM = 1 + len(MEASURES)
 SQUARES = 1 + 2 * len(MEASURES)
 CELL = 1 + 3 * len(MEASURES)
-AT_ONCE = 1e-9  # shorter waits are none [s]
+NO_WAIT_S = 1e-9  # shorter waits are none [s]
 _NAN = math.nan
 
 
@@ -219,7 +219,7 @@ def _sum_up(cell: list[float], since: float, event: Event) -> None:
         if time is None:
             continue
         span = time - since
-        if span < AT_ONCE:
+        if span < NO_WAIT_S:
             span = 0.0
         elif place == 0:
             cell[WAITED] += 1.0

@@ -14,8 +14,8 @@ from dva_sim.simulation.timed.recording import TimedRecording
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.simulation import Shift
 
-MOST_EVENTS = 12  # an exact plan for more takes too long
-MOST_UNITS = 4  # likewise
+MAX_EVENTS = 12  # an exact plan for more takes too long
+MAX_UNITS = 4  # likewise
 
 
 class _Nobody(Policy):
@@ -67,9 +67,9 @@ def _foresee(scenario: TimedScenario, seed: int) -> tuple[Shift, list[Incident]]
     shift = Shift(watched, seed, _Nobody())
     shift.run()
     incidents = [each for events in shift.events.values() for each in events]
-    if not 0 < len(incidents) <= MOST_EVENTS:
+    if not 0 < len(incidents) <= MAX_EVENTS:
         raise ConfigError(
-            f"the oracle plans for 1 to {MOST_EVENTS} events; this run has {len(incidents)}: "
+            f"the oracle plans for 1 to {MAX_EVENTS} events; this run has {len(incidents)}: "
             "give max_events, or a shorter horizon_s"
         )
     return shift, incidents
@@ -80,10 +80,10 @@ def _check_small(scenario: TimedScenario) -> None:
     alike = all(g.kind == "guard" and g.after == "return" for g in scenario.responders)
     plain = all(s.sources is None and s.patience is None for s in scenario.demand)
     together = all(g.from_s == 0.0 for g in scenario.responders)
-    few = len(scenario.names) <= MOST_UNITS and not scenario.dispatch.containment
+    few = len(scenario.names) <= MAX_UNITS and not scenario.dispatch.containment
     if not (alike and plain and together and few):
         raise ConfigError(
-            f"the oracle plans for up to {MOST_UNITS} guards that look and return (after: "
+            f"the oracle plans for up to {MAX_UNITS} guards that look and return (after: "
             "return), without containment, patience, finite sources or later shifts"
         )
     if scenario.merge_distance:

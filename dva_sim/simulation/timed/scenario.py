@@ -179,7 +179,7 @@ Box = tuple[float, float, float, float]
 
 LOOK_S = Constant(mean_s=0.0)
 ACT_S = Constant(mean_s=0.0)
-MOST_UNITS = 2000
+MAX_UNITS = 2000
 
 
 class TimedSite(Config):
@@ -221,7 +221,7 @@ class Group(Config):
 
     name: Name
     kind: Literal["guard", "robot"] = "guard"
-    count: Annotated[int, Field(ge=1, le=MOST_UNITS)] = 1
+    count: Annotated[int, Field(ge=1, le=MAX_UNITS)] = 1
     base: Point | str | None = None
     speed_mps: Positive = 1.0
     speed_sd_mps: NonNegative = 0.0
@@ -241,7 +241,7 @@ class Group(Config):
 class Operators(Config):
     """Drivers of the robots."""
 
-    count: Annotated[int, Field(ge=0, le=MOST_UNITS)] = 0
+    count: Annotated[int, Field(ge=0, le=MAX_UNITS)] = 0
 
 
 class Severity(Config):

@@ -34,8 +34,8 @@ class Occurrence(Protocol):
     index: int
 
 
-APART = 1e-10  # between events at one place, so that each position is one event's [deg]
-FAR_APART = 1e-5  # where place does not matter, so that nobody takes two events for one [deg]
+PLACE_STEP_DEG = 1e-10  # between events at one place, so that each position is one event's [deg]
+EVENT_STEP_DEG = 1e-5  # where place does not matter, so that nobody takes two events for one [deg]
 NUMBERED = 4096  # positions at one place before they repeat
 
 
@@ -77,7 +77,7 @@ class Terrain:
     placed = False
 
     def __init__(
-        self, zones: Sequence[str], frame: GeoFrame = DEFAULT_FRAME, apart: float = FAR_APART
+        self, zones: Sequence[str], frame: GeoFrame = DEFAULT_FRAME, apart: float = EVENT_STEP_DEG
     ) -> None:
         self.zones = list(zones)
         self.frame = frame
@@ -217,7 +217,7 @@ class Plane(Terrain):
         zones: dict[str, tuple[float, float, float, float]],
         straight: bool = True,
     ) -> None:
-        super().__init__(list(zones) or ["area"], apart=APART)
+        super().__init__(list(zones) or ["area"], apart=PLACE_STEP_DEG)
         self._boxes = list(zones.values()) or [(0.0, 0.0, width, height)]
         self._whole = (0.0, 0.0, width, height)
         self._straight = straight
@@ -289,7 +289,7 @@ def terrain_of(scenario: TimedScenario) -> Terrain:
 
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
-MOST_PATHS = 5000  # kept at a time
+MAX_PATHS = 5000  # kept at a time
 FOUND = 3600.0  # what no detector notices people do, after so long [s]; assumed
 WALL = 0.05  # thickness of a wall [m]
 PASSAGE = 0.6  # least width to pass [m]
@@ -314,7 +314,7 @@ class _Ways:
     def path(self, a: Point, b: Point) -> Floats | None:
         """Return the way itself: who is under way is asked again and again where it is."""
         if (a, b) not in self._paths:
-            if len(self._paths) >= MOST_PATHS:
+            if len(self._paths) >= MAX_PATHS:
                 self._paths.clear()
             self._paths[a, b] = self.planner.path(a, b)
         return self._paths[a, b]
@@ -381,7 +381,7 @@ class Rooms(Terrain):
         self.site = load_site(name)
         if not self.site.rooms:
             raise ConfigError(f"site {name!r} has no rooms: events need them")
-        super().__init__([room.name for room in self.site.rooms], self.site.frame, APART)
+        super().__init__([room.name for room in self.site.rooms], self.site.frame, PLACE_STEP_DEG)
         self._ways = _ways_of(self.site)
         self._way = way
         self._spots = [

@@ -50,7 +50,7 @@ from dva_sim.validation.evidence import Verdict
 ERRORS = 3.0  # an estimate may be so many standard errors off
 TOLERANCE = 0.005  # or so much, as a share of the exact value
 PRECISION = 0.01  # standard error asked for, as a share of the exact value
-MANY = 100  # batches whose own spread is known well enough
+KNOWN_SPREAD_BATCHES = 100  # batches whose own spread is known well enough
 _FOLDS = 10
 _BATCHES_PER_CONTROL = 5  # with fewer, weights are noise
 _ROUNDING = 1e-9  # what arithmetic alone may cost
@@ -168,7 +168,7 @@ def _rounding(exact: float) -> float:
 @cache
 def _errors_allowed(batches: int) -> float:
     """Return by how many standard errors a correct estimate from `batches` may be off."""
-    if not 1 < batches < MANY:
+    if not 1 < batches < KNOWN_SPREAD_BATCHES:
         return ERRORS
     from scipy import special
 

@@ -43,7 +43,7 @@ from dva_sim.validation.dispatch.queues import (
 
 Ints = NDArray[np.int64]
 
-MOST_UNITS = 8
+MAX_UNITS = 8
 
 
 def hypercube(
@@ -71,8 +71,8 @@ def hypercube(
         R. C. Larson, Comput. Oper. Res. 1 (1974) 67-95, solved exactly as a Markov chain.
     """
     units = len(preferences[0])
-    if not 1 <= units <= MOST_UNITS:
-        raise ValueError(f"{units} units; from 1 to {MOST_UNITS} can be solved")
+    if not 1 <= units <= MAX_UNITS:
+        raise ValueError(f"{units} units; from 1 to {MAX_UNITS} can be solved")
     if any(sorted(order) != list(range(1, units + 1)) for order in preferences):
         raise ValueError(f"each list of preferences should name the units 1 to {units} once")
     calls = np.asarray(arrival_rates, dtype=float)

@@ -26,8 +26,8 @@ STEPS = 200  # of time in a delay
 SMITH_STEPS = 500  # the same under a Smith predictor
 DELAYS = 80  # a run lasts so many of them
 BISECTIONS = 14
-_FAR = 1e6  # a limit that is never reached
-LIMITLESS = Reach(speed=_FAR, turn_rate=_FAR)
+_NO_LIMIT = 1e6  # a limit that is never reached
+LIMITLESS = Reach(speed=_NO_LIMIT, turn_rate=_NO_LIMIT)
 
 Loop = Callable[[float], Sequence[float]]
 
@@ -88,10 +88,10 @@ def pure_pursuit(speed_delay: float) -> list[float]:
     Returns:
         Distance from the line, signed, step by step [m].
     """
-    person = replace(_person(), caution=_FAR)
+    person = replace(_person(), caution=_NO_LIMIT)
     dt = 1.0 / STEPS
     speed = speed_delay * person.habits.steering.nearest_look_m
-    pursuit = Pursuit(person, Reach(speed, _FAR))
+    pursuit = Pursuit(person, Reach(speed, _NO_LIMIT))
     route = Route(np.array([[0.0, 0.0], [2.0 * DELAYS, 0.0]]))
     x = 1.0
     y = 1e-3
@@ -136,7 +136,7 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
 
 def _person(gain: float = 1.0) -> Person:
     """Return a person of that gain [1/s] in a loop that no margin keeps stable."""
-    return replace(median_person(Population()), pointing=gain, margin=_FAR, pace=1.0)
+    return replace(median_person(Population()), pointing=gain, margin=_NO_LIMIT, pace=1.0)
 
 
 def _cursor(x: float, target: float) -> Sighting:

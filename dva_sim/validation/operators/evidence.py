@@ -17,7 +17,7 @@ from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.people_figures import draw_curves
 from dva_sim.validation.operators.trials import Cells, Found, certain, mean
 
-OTHER = "standards"  # the exact lines that have nothing to do with operators and phones
+STANDARDS = "standards"  # the exact lines that have nothing to do with operators and phones
 GROUPS: dict[tuple[LineKind, bool], str] = {
     ("exact", False): "Operators and phones: theory, the dissertation's app (exact)",
     ("held-out", False): "Operators: published experiments that no fit used (held out, not unseen)",
@@ -26,7 +26,7 @@ GROUPS: dict[tuple[LineKind, bool], str] = {
     ("remembered", False): "Operators: from memory, shown, never counted",
     ("exact", True): "Fires, alarms and people on foot: standards and textbooks (exact)",
 }
-"""Headings, in their order, by kind and by whether the line is one of `OTHER`."""
+"""Headings, in their order, by kind and by whether the line is one of `STANDARDS`."""
 COUNTED: tuple[LineKind, ...] = ("exact", "held-out")
 STEERING = (
     "In which share of the time the persons of each experiment moved and waited for what they had "
@@ -102,7 +102,7 @@ def _judged(line: TargetLine, simulated: Found) -> Evidence:
         notes.append("at the edge of what was tried")
     return Evidence(
         "operators",
-        GROUPS[line.kind, line.publication == OTHER],
+        GROUPS[line.kind, line.publication == STANDARDS],
         line.id,
         line.what,
         source=f"{line.metric}: {line.source} [{line.tag}]",

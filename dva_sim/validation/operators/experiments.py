@@ -47,7 +47,7 @@ from dva_sim.validation.operators.trials import (
 FOLDER = "experiments/scenarios/tasks"
 
 LAGS_S = {"8.3": 0.0, "25": 1 / 60, "75": 4 / 60, "225": 13 / 60}  # by the lag's name [ms]
-SHORTEST_LAG = "8.3"  # half a frame
+MIN_LAG = "8.3"  # half a frame
 PUBLISHED_LAGS = ("8.3", "25", "75")
 AT_BITS = 4.0
 GAINS = {25: 0.2435, 50: 0.487, 100: 0.974, 200: 1.948}  # pixels/s per degree: [m/s per rad]
@@ -55,7 +55,7 @@ PUBLISHED_GAIN = 50
 SELECTIONS = {"first-entry": "first_entry", "dwell": "dwell"}
 LATENCY_S = 0.05  # of the machine in the steering experiment; assumed
 STEP_S = 1.0 / 60.0
-FEWEST_WAITS = 0.5  # in a trial on average; who waits less does not move and wait
+MIN_WAITS = 0.5  # in a trial on average; who waits less does not move and wait
 WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
 EXCAVATOR_S = 1.5
 FRAME_RATES = (5, 10, 20, 60)
@@ -88,7 +88,7 @@ class Experiment:
 def lag_values(cells: Cells) -> Values:
     """Ratios of mean movement times, what a millisecond of lag costs at 4 bits, the times [ms]."""
     times = {lag: mean(trials, "movement_time_s") for lag, trials in cells.items()}
-    ratio = {lag: time / times[SHORTEST_LAG] for lag, time in times.items()}
+    ratio = {lag: time / times[MIN_LAG] for lag, time in times.items()}
     values = {"S7/25": ratio["25"], "S7/75": ratio["75"], "S8/slope": lag_slope(cells)}
     return values | {f"S7/time-{lag}": 1000.0 * times[lag] for lag in PUBLISHED_LAGS}
 
@@ -170,7 +170,7 @@ def wait_values(cells: Cells) -> Values:
     line = fit_line(delays, times)
     waits = float(np.mean([mean(trials, "waits") for trials in cells.values()]))
     straight = line.r2 if np.ptp(times) >= _NOTHING else math.nan  # nothing there to explain
-    beyond = line.slope - waits if waits >= FEWEST_WAITS else math.nan
+    beyond = line.slope - waits if waits >= MIN_WAITS else math.nan
     return {"S13/linear": straight, "S13/slope": beyond}
 
 
@@ -335,18 +335,20 @@ def pushed_values(cells: Cells) -> Values:
 
 
 # --- the first steering: Goodridge et al. 2022 -------------------------------------------------
-SOONEST_S = 1e-3  # an operator without a reaction time has one of so much, for its logarithm
+MIN_REACTION_S = 1e-3  # an operator without a reaction time has one of so much, for its logarithm
 
 
 def log_reactions(trials: Trials) -> Floats:
     """Return the natural logarithms of reaction times [log s], shape `(trials,)`."""
-    return np.log(np.maximum(trials["reaction_s"], SOONEST_S))
+    return np.log(np.maximum(trials["reaction_s"], MIN_REACTION_S))
 
 
 def heading_values(cells: Cells) -> Values:
     """Return the reaction times by error, their spread, and how long the first correction grows."""
     errors = {int(error): own for (error,), own in cells["heading"].by("heading_error_deg")}
-    medians = {e: np.maximum(person_medians(t, "reaction_s"), SOONEST_S) for e, t in errors.items()}
+    medians = {
+        e: np.maximum(person_medians(t, "reaction_s"), MIN_REACTION_S) for e, t in errors.items()
+    }
     pulses = np.concatenate([own["pulse_s"] for own in errors.values()])
     means = np.array([person_means_of(own, log_reactions) for own in errors.values()])
     left = np.concatenate(
@@ -383,13 +385,13 @@ def vehicle_values(cells: Cells) -> Values:
 def look_values(cells: Cells) -> Values:
     """Return quartiles of the looks of all, and the spread of their logarithm."""
     looks = cells["two"]["look_s"]
-    looks = looks[looks > SHORTEST_LOOK_S]
+    looks = looks[looks > MIN_LOOK_S]
     first, median, third = np.quantile(looks, [0.25, 0.5, 0.75])
     spread = float(np.log(looks).std(ddof=1))
     return {"E2/median": median, "E2/first": first, "E2/third": third, "E3/spread": spread}
 
 
-SHORTEST_LOOK_S = 0.3  # what is shorter was not counted
+MIN_LOOK_S = 0.3  # what is shorter was not counted
 
 
 def alarm_values(cells: Cells) -> Values:
@@ -409,7 +411,7 @@ def walker_values(cells: Cells) -> Values:
 
 
 # --- all of them -----------------------------------------------------------------------------
-LATE = "link.down.delay_s"
+DELAY_KEY = "link.down.delay_s"
 
 
 _TILT_CELLS: dict[str, dict[str, Any]] = {
@@ -418,14 +420,14 @@ _TILT_CELLS: dict[str, dict[str, Any]] = {
     for name, selection in SELECTIONS.items()
 }
 _FRAME_CELLS: dict[str, dict[str, Any]] = {
-    frame_cell(rate, delay): {"frames.rate_hz": rate, LATE: delay}
+    frame_cell(rate, delay): {"frames.rate_hz": rate, DELAY_KEY: delay}
     for rate in FRAME_RATES
     for delay in FRAME_DELAYS_S
 }
 
 
 def _both_ways(delay: float) -> dict[str, Any]:
-    return {"link.up.delay_s": 0.5 * delay, LATE: 0.5 * delay}
+    return {"link.up.delay_s": 0.5 * delay, DELAY_KEY: 0.5 * delay}
 
 
 def _moving_cells() -> dict[str, dict[str, Any]]:
@@ -445,16 +447,18 @@ _TWO = {"trials": 2, "practice": 1}
 _FEW = {"trials": 3, "practice": 1}
 
 EXPERIMENTS: tuple[Experiment, ...] = (
-    Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _ONE),
+    Experiment(
+        "lag", "fitts-lag", {lag: {DELAY_KEY: s} for lag, s in LAGS_S.items()}, lag_values, _ONE
+    ),
     Experiment("tilt", "fitts-tilt", _TILT_CELLS, tilt_values, _TWO),
     Experiment("steering", "steering-law", {"tunnel": {}}, steering_values, _TWO),
     Experiment(
         "latency",
         "steering-law",
         {
-            "less": {LATE: LATENCY_S - STEP_S},
-            "as it is": {LATE: LATENCY_S},
-            "more": {LATE: LATENCY_S + STEP_S},
+            "less": {DELAY_KEY: LATENCY_S - STEP_S},
+            "as it is": {DELAY_KEY: LATENCY_S},
+            "more": {DELAY_KEY: LATENCY_S + STEP_S},
         },
         latency_values,
         _ONE,
@@ -465,7 +469,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
         "excavator",
         "excavator",
-        {"0": {LATE: 0.0}, str(EXCAVATOR_S): {LATE: EXCAVATOR_S}},
+        {"0": {DELAY_KEY: 0.0}, str(EXCAVATOR_S): {DELAY_KEY: EXCAVATOR_S}},
         excavator_values,
         _ONE,
     ),

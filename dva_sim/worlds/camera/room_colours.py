@@ -15,7 +15,7 @@ from dva_sim.worlds.site import Site
 Colours = NDArray[np.uint32]
 
 ACCENTS = 12  # different colours of rooms
-MOST_CELLS = 4_000_000  # of a floor
+MAX_CELLS = 4_000_000  # of a floor
 BORDER = 1.0  # of unknown ground around a site [m]
 BLOCK = 16  # cells; floors are made of whole blocks, so that coarser ones fit
 FACADE = (0.74, 0.60, 0.50)  # from outside
@@ -44,7 +44,7 @@ class RoomGrid:
     def __init__(self, site: Site) -> None:
         xmin, ymin, xmax, ymax = site.extent
         sides = ymax - ymin + 2 * BORDER, xmax - xmin + 2 * BORDER
-        self.cell = max(0.05, (sides[0] * sides[1] / MOST_CELLS) ** 0.5)
+        self.cell = max(0.05, (sides[0] * sides[1] / MAX_CELLS) ** 0.5)
         self.origin = xmin - BORDER, ymin - BORDER
         rows, columns = (BLOCK * int(np.ceil(side / self.cell / BLOCK)) for side in sides)
         self.numbers = _room_numbers(site, self.origin, self.cell, (rows, columns))

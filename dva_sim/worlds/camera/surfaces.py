@@ -26,8 +26,8 @@ POST = 0.08  # width of a door post [m]
 REVEAL = 0.07  # how far a door frame stands out of the wall on both sides [m]
 SHORT = 0.6  # shorter pieces of wall, as bare maps have them, make no corners [m]
 HANGING = 0.04  # so much behind a wall it still counts as on it [m]
-NEAR = 0.05  # what is nearer to the lens is cut off [m]
-FAR = 80.0  # what is farther away is not looked for [m]
+NEAR_PLANE_M = 0.05  # what is nearer to the lens is cut off [m]
+FAR_PLANE_M = 80.0  # what is farther away is not looked for [m]
 
 WALL, FRAME, LINTEL, SOLID, LEAF, NOTHING = range(6)
 
@@ -105,8 +105,8 @@ class Surfaces:
         if len(doors):
             jambs = doors.reshape(-1, 1, 1, 2)
             gaps = np.hypot(*np.moveaxis(self.ends.reshape(1, -1, 2, 2) - jambs, -1, 0))
-            places[gaps.min(axis=0) < 0.2] = -FAR
-        places[(self.kind == LINTEL) | (self.length < SHORT)] = -FAR
+            places[gaps.min(axis=0) < 0.2] = -FAR_PLANE_M
+        places[(self.kind == LINTEL) | (self.length < SHORT)] = -FAR_PLANE_M
         return places.astype(np.float32)
 
     def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
@@ -130,7 +130,7 @@ class Surfaces:
         walls = Hits(
             columns,
             np.r_[walls.surface, len(self.kind) - 1][nearest],
-            np.r_[walls.depth, np.float32(FAR)][nearest],
+            np.r_[walls.depth, np.float32(FAR_PLANE_M)][nearest],
             np.r_[walls.along, np.float32(0)][nearest],
         )
         reach = walls.depth[met.column] + self._slack[met.surface]
@@ -144,8 +144,8 @@ class Surfaces:
         turn = np.array([[cos, sin], [sin, -cos]], dtype=np.float32)  # ahead, to the right
         ends = (self.ends - np.array([pose.x, pose.y] * 2, dtype=np.float32)).reshape(-1, 2)
         local = (ends @ turn.T).reshape(-1, 4)
-        ahead = (np.maximum(local[:, 0], local[:, 2]) > NEAR) & (
-            np.minimum(local[:, 0], local[:, 2]) < FAR
+        ahead = (np.maximum(local[:, 0], local[:, 2]) > NEAR_PLANE_M) & (
+            np.minimum(local[:, 0], local[:, 2]) < FAR_PLANE_M
         )
         ahead[-1] = False
         index = np.flatnonzero(ahead)
@@ -175,8 +175,12 @@ def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
     dt = t2 - t1
     det = z1 * dt - t1 * dz
     with np.errstate(divide="ignore", invalid="ignore"):
-        cut1 = np.where(z1 < NEAR, t1 + (NEAR - z1) / dz * dt, t1) / np.maximum(z1, NEAR)
-        cut2 = np.where(z2 < NEAR, t2 + (NEAR - z2) / dz * dt, t2) / np.maximum(z2, NEAR)
+        cut1 = np.where(z1 < NEAR_PLANE_M, t1 + (NEAR_PLANE_M - z1) / dz * dt, t1) / np.maximum(
+            z1, NEAR_PLANE_M
+        )
+        cut2 = np.where(z2 < NEAR_PLANE_M, t2 + (NEAR_PLANE_M - z2) / dz * dt, t2) / np.maximum(
+            z2, NEAR_PLANE_M
+        )
     first = np.searchsorted(slopes, np.minimum(cut1, cut2))
     last = np.searchsorted(slopes, np.maximum(cut1, cut2))
     return first, last, det, np.stack([dz, dt], axis=1)

@@ -34,8 +34,8 @@ PANEL_COLUMNS = 32
 WINDOW = 2.4  # and an outer wall a window [m]
 WINDOW_COLUMNS = 64
 SIGN_COLUMNS = 96  # of a lintel, from post to post
-THROUGH = 0.15  # so far on both sides of a wall its rooms are looked for [m]
-BEYOND = 0.4  # so far behind a door its room is looked for [m]
+BESIDE_WALL_M = 0.15  # so far on both sides of a wall its rooms are looked for [m]
+BEHIND_DOOR_M = 0.4  # so far behind a door its room is looked for [m]
 
 WOOD = (138, 98, 60)
 PLASTER = (226, 225, 220)
@@ -76,7 +76,7 @@ class Uprights:
         x, y = far
         x1, y1, x2, y2 = self._surfaces.ends[hits.surface].T
         left = (x2 - x1) * (pose_xy[1] - y1) - (y2 - y1) * (pose_xy[0] - x1) > 0
-        gap = np.where(left, THROUGH, -THROUGH) / self._surfaces.length[hits.surface]
+        gap = np.where(left, BESIDE_WALL_M, -BESIDE_WALL_M) / self._surfaces.length[hits.surface]
         dx = gap * (y1 - y2)
         dy = gap * (x2 - x1)
         here = self._rooms.at(x + dx, y + dy)
@@ -172,7 +172,7 @@ def _signs(site: Site) -> list[tuple[float, str, str]]:
     signs = []
     for x1, y1, x2, y2 in doorways(site)[0].tolist():
         wide = max(float(np.hypot(x2 - x1, y2 - y1)), 0.1)
-        left = np.array([-(y2 - y1), x2 - x1]) / wide * BEYOND
+        left = np.array([-(y2 - y1), x2 - x1]) / wide * BEHIND_DOOR_M
         middle = np.array([x1 + x2, y1 + y2]) / 2
         signs.append((wide, _name(site, middle + left), _name(site, middle - left)))
     return signs

@@ -16,7 +16,7 @@ GAIN = np.array([0.75, 0.12, -0.4], dtype=np.float32)  # of red, green, blue by 
 GLOW_REACH = 1.6  # half of the firelight is left there [m], assumed
 SAMPLES = 64  # of the air along each ray
 REACH = 32.0  # beyond this the air is taken to be as it is there [m]
-WET = 0.003  # from this depth on a floor mirrors [m]
+MIRRORING_DEPTH_M = 0.003  # from this depth on a floor mirrors [m]
 WATER = np.array([92, 128, 160], dtype=np.float32)
 
 
@@ -155,7 +155,7 @@ def add_water(scene: Floats, water: Floats, base: Floats, grazing: Floats, time:
         grazing: Share that a row's water mirrors, 0 to 1 `(h,)`.
         time: Moves the ripples [s].
     """
-    wet = np.flatnonzero(water > WET)
+    wet = np.flatnonzero(water > MIRRORING_DEPTH_M)
     if not len(wet):
         return
     rows, columns = np.divmod(wet, scene.shape[2])

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.hazards.building import KEPT_PLACES, NOWHERE, Building
+from dva_sim.worlds.hazards.building import KEPT_PLACES, NO_SPACE, Building
 from dva_sim.worlds.maps import FREE, OccupancyGrid
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 
 MIXED_HEIGHT = 3.0  # the jet of a leak mixes the air up to the ceiling [m]; assumed
 CELL = 0.5  # side of a coarse cell [m]
-MOST_CELLS = 40_000  # larger houses have larger cells
+MAX_CELLS = 40_000  # larger houses have larger cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +68,13 @@ class Mesh:
 @lru_cache(maxsize=8)
 def mesh_in(building: Building) -> Mesh:
     """Return the mesh of all floor indoors, once per process."""
-    inside = (building.grid.cells == FREE) & (building.labels != NOWHERE)
+    inside = (building.grid.cells == FREE) & (building.labels != NO_SPACE)
     return make_mesh(building.grid, inside, side_for(inside.sum() * building.grid.resolution**2))
 
 
 def side_for(floor: float) -> float:
-    """Side of a coarse cell [m] that makes no more than about `MOST_CELLS` of a floor [m^2]."""
-    return max(CELL, math.sqrt(floor / MOST_CELLS))
+    """Side of a coarse cell [m] that makes no more than about `MAX_CELLS` of a floor [m^2]."""
+    return max(CELL, math.sqrt(floor / MAX_CELLS))
 
 
 def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) -> Mesh:

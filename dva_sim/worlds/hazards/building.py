@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LONGEST = 12.0  # longer corridors do not fill from end to end at once: they are parted [m]
-NOWHERE = -1  # in no space
+NO_SPACE = -1  # in no space
 KEPT_PLACES = 64  # of which it is known where in the building they are
 
 
@@ -55,7 +55,7 @@ class Building:
     Attributes:
         spaces: Its bodies of air; long ones are parted.
         grid: Grid of the cells.
-        labels: The space of each cell, or `NOWHERE`, shape `(rows, columns)`.
+        labels: The space of each cell, or `NO_SPACE`, shape `(rows, columns)`.
     """
 
     spaces: Spaces
@@ -64,10 +64,10 @@ class Building:
 
     @cached_property
     def space_at(self) -> Callable[[float, float], int]:
-        """Index of the space around a point [m], or `NOWHERE`; all hazards ask of one in turn."""
+        """Index of the space around a point [m], or `NO_SPACE`; all hazards ask of one in turn."""
         look_up = self.grid.look_up
         labels = self.labels
-        return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(labels, x, y, NOWHERE)))
+        return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(labels, x, y, NO_SPACE)))
 
 
 class SitePoints:
@@ -78,7 +78,7 @@ class SitePoints:
         points: Shape `(..., 2)` [m].
 
     Attributes:
-        spaces: Index of the space around each point, or `NOWHERE`.
+        spaces: Index of the space around each point, or `NO_SPACE`.
     """
 
     def __init__(self, building: Building, points: Floats) -> None:
@@ -119,7 +119,7 @@ def _building(site: Site) -> Building:
         area=np.array(parting.area),
         ceiling=ceiling,
         a=joints[:, 0],
-        b=np.where(joints[:, 1] == NOWHERE, len(ceiling), joints[:, 1]),
+        b=np.where(joints[:, 1] == NO_SPACE, len(ceiling), joints[:, 1]),
         width=np.array([*(o.width for o in openings), *(width for _, _, width in parting.cuts)]),
         top=np.array([*(o.height for o in openings), *tops]),
     )
@@ -161,8 +161,8 @@ class _Parting:
         self.ceiling: list[float] = []
         self.cuts: list[tuple[int, int, float]] = []
         whole = site.partition.labels
-        self.labels = np.full(whole.shape, NOWHERE, np.int16)
-        cells = np.flatnonzero(whole != NOWHERE)
+        self.labels = np.full(whole.shape, NO_SPACE, np.int16)
+        cells = np.flatnonzero(whole != NO_SPACE)
         order = np.argsort(whole.ravel()[cells], kind="stable")
         numbers = np.arange(len(site.compartments) + 1)
         bounds = np.searchsorted(whole.ravel()[cells][order], numbers)
@@ -195,7 +195,7 @@ class _Parting:
 
     def sides(self, a: str, b: str | None, x: float, y: float) -> tuple[int, int]:
         """Return the parts that an opening at a point [m] joins."""
-        return self._nearest(a, x, y), NOWHERE if b is None else self._nearest(b, x, y)
+        return self._nearest(a, x, y), NO_SPACE if b is None else self._nearest(b, x, y)
 
     def _nearest(self, name: str, x: float, y: float) -> int:
         """Return the part of a compartment nearest to a point [m]."""

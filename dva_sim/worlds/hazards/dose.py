@@ -19,7 +19,7 @@ MINUTE = 60.0
 BREATHING = 25.0  # air breathed in light work [L/min]
 CO_LIMIT = 30.0  # carboxyhaemoglobin at which people in light work collapse [%]
 OXYGEN = 0.209  # share of the air
-LEAST_OXYGEN_LACK = 0.01  # less goes unnoticed; assumed
+MIN_OXYGEN_LACK = 0.01  # less goes unnoticed; assumed
 LUKEWARM = 60.0  # air does no harm below [deg C]; assumed
 
 SMOKE_SLOWS = 0.057 / 0.706  # share of walking speed lost per 1/m of extinction, in 0.706 m/s
@@ -70,7 +70,7 @@ def toxic_rate(conditions: Conditions) -> float:
     """Dose of carbon monoxide and of lack of oxygen, which a leaking gas drives out, per minute."""
     rate = 3.317e-5 * conditions.co**1.036 * BREATHING / CO_LIMIT
     lack = 100.0 * OXYGEN * conditions.gas  # [%] of the air
-    if lack > 100.0 * LEAST_OXYGEN_LACK:
+    if lack > 100.0 * MIN_OXYGEN_LACK:
         rate += 1.0 / math.exp(8.13 - 0.54 * lack)
     return float(rate)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints
+from dva_sim.worlds.hazards.building import NO_SPACE, Building, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import (
     AMBIENT,
     BREATHING_HEIGHT,
@@ -57,11 +57,11 @@ GROWTH_S = {"slow": 600.0, "medium": 300.0, "fast": 150.0, "ultrafast": 75.0}
 HEAT_PER_AREA = 500.0  # heat release of burning floor [kW/m^2]; assumed, offices: 150 to 650
 FIRE_LOAD = 420e3  # fuel of an office, the mean [kJ/m^2]
 DECAY_FROM = 0.7  # share of the fuel burnt when the fire begins to die down
-MOST_PEAK_KW = 100e3  # assumed; beyond any building, and beyond what the field is made for
+MAX_PEAK_KW = 100e3  # assumed; beyond any building, and beyond what the field is made for
 PEAK_KW = 5000.0  # what the air through one door can burn, 1500 A sqrt(H) for 1.1 m x 2.1 m [kW]
 
 TENABLE_HEAT = 2.5  # radiant heat that skin bears for long [kW/m^2]
-LEAST_DANGER = 2.0  # from flames, however small [m]; assumed
+MIN_DANGER = 2.0  # from flames, however small [m]; assumed
 FLAME_RATE = 8.0  # of the flickering before a camera [1/s]
 
 
@@ -99,7 +99,7 @@ class Fire(Hazard):
     contained_by = "extinguisher"
 
     growth: Literal["slow", "medium", "fast", "ultrafast"] = "medium"
-    peak: Annotated[float, Field(gt=0, le=MOST_PEAK_KW)] = PEAK_KW
+    peak: Annotated[float, Field(gt=0, le=MAX_PEAK_KW)] = PEAK_KW
 
     @model_validator(mode="after")
     def _has_the_fuel(self) -> Fire:
@@ -148,7 +148,7 @@ class Fire(Hazard):
         if time < self.start:
             return 0.0
         radiated = RADIATIVE_FRACTION * self.heat_release(time)
-        return max(LEAST_DANGER, math.sqrt(radiated / (4.0 * math.pi * TENABLE_HEAT)))
+        return max(MIN_DANGER, math.sqrt(radiated / (4.0 * math.pi * TENABLE_HEAT)))
 
     @override
     def severity(self, time: float) -> float:
@@ -345,7 +345,7 @@ class FireField(SolvedField):
         return self._layers[space]
 
     def _layer(self, space: int, time: float) -> Layer | None:
-        if self.room == NOWHERE or time <= self._fire.start:
+        if self.room == NO_SPACE or time <= self._fire.start:
             return None
         before, after, weight = self.states(time)
         mass, heat, soot, co = (before[space] + weight * (after[space] - before[space])).tolist()
@@ -371,7 +371,7 @@ class FireField(SolvedField):
             time: [s]
             where: At `breathing` height, the `mean` from floor to ceiling, or in the `layer`.
         """
-        if self.room == NOWHERE or time <= self._fire.start:
+        if self.room == NO_SPACE or time <= self._fire.start:
             return np.zeros(self.building.spaces.count + 1)
         state = self.state(time)[:-1]
         volume, share = self._filled(state)
@@ -395,7 +395,7 @@ class FireField(SolvedField):
         Volumes change on straight lines from one state of the field to the next, so that it is
         enough to look at both, each once for all runs that share it.
         """
-        if self.room == NOWHERE or time <= self._start:
+        if self.room == NO_SPACE or time <= self._start:
             return False
         march, age = self.march(time)
         after = march.after(age)

@@ -20,12 +20,12 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import override
 
-from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints, Spaces
+from dva_sim.worlds.hazards.building import NO_SPACE, Building, Floats, SitePoints, Spaces
 from dva_sim.worlds.hazards.conditions import CLEAR, Conditions
 from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
 from dva_sim.worlds.site import Site
 
-MOST_INFLOW = 10.0  # assumed; beyond any building [m^3/s]
+MAX_INFLOW = 10.0  # assumed; beyond any building [m^3/s]
 INFLOW = 2e-3  # a burst pipe [m^3/s]; assumed
 FILM = 5e-3  # depth of water that spreads on a level floor [m]; about twice the capillary length
 BASIN = 50.0  # floor of a usual room [m^2]; assumed
@@ -33,7 +33,7 @@ DOOR = 1.2  # width of its door [m]; assumed
 SILL = 0.01  # height of the threshold [m]; assumed
 WEIR = 1.705  # of a broad-crested weir, (2/3)^1.5 sqrt(g) [m^0.5/s]
 DEEP = 0.1  # water that can take a person's footing, and hides steps [m]; assumed
-LEAST_DANGER = 1.0  # from the source: it is slippery, and sockets are near [m]; assumed
+MIN_DANGER = 1.0  # from the source: it is slippery, and sockets are near [m]; assumed
 FULL_VOLUME = 1.0  # counts as severity 1 [m^3]; assumed
 
 
@@ -51,7 +51,7 @@ class Flood(Hazard):
     colour = "#2a7fb8"
     mark = "v"
 
-    inflow: Annotated[float, Field(gt=0, le=MOST_INFLOW)] = INFLOW
+    inflow: Annotated[float, Field(gt=0, le=MAX_INFLOW)] = INFLOW
 
     def volume(self, time: float) -> float:
         """Return the water that has come until `time` [s], in [m^3]."""
@@ -74,7 +74,7 @@ class Flood(Hazard):
             return 0.0
         balance = SILL + (self.inflow / (WEIR * DOOR)) ** (2.0 / 3.0)
         deep = min(self.volume(time) / BASIN, balance) > DEEP
-        return math.sqrt(BASIN / math.pi) if deep else LEAST_DANGER
+        return math.sqrt(BASIN / math.pi) if deep else MIN_DANGER
 
     @override
     def severity(self, time: float) -> float:
@@ -166,7 +166,7 @@ class FloodField(SolvedField):
     @override
     def at(self, x: float, y: float, time: float) -> Conditions:
         space = self.building.space_at(x, y)
-        if space == NOWHERE or self.room == NOWHERE or time <= self._flood.start:
+        if space == NO_SPACE or self.room == NO_SPACE or time <= self._flood.start:
             return CLEAR
         before, after, weight = self.states(time)
         volume = float(before[space]) * (1.0 - weight) + float(after[space]) * weight
@@ -180,7 +180,7 @@ class FloodField(SolvedField):
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
         if what != "water":
             return None
-        if self.room == NOWHERE or time <= self._flood.start:
+        if self.room == NO_SPACE or time <= self._flood.start:
             return np.zeros(places.spaces.shape)
         state = self.state(time)
         level = np.append(state[:-1] / self.building.spaces.area, 0.0)

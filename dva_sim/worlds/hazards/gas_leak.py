@@ -13,7 +13,7 @@ from pydantic import Field
 from typing_extensions import override
 
 from dva_sim.worlds.hazards.air_mesh import MIXED_HEIGHT, mesh_in
-from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints
+from dva_sim.worlds.hazards.building import NO_SPACE, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import BREATHING_HEIGHT, Conditions
 from dva_sim.worlds.hazards.detectors import DetectorAlarm, alarm_in
 from dva_sim.worlds.hazards.gas_dispersion import Air, Draught, air_in
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 HOUR = 3600.0
 EDDY_DIFFUSIVITY = 0.05  # of air that ventilation stirs [m^2/s]; assumed
 AIR_CHANGES = 2.0  # of fresh air per hour; assumed
-LEAST_DANGER = 1.0  # from where it leaks [m]; assumed
+MIN_DANGER = 1.0  # from where it leaks [m]; assumed
 FULL_CLOUD = 50.0  # a small room's air at the danger level counts as severity 1 [m^3]; assumed
 
 
@@ -135,7 +135,7 @@ class GasLeak(Hazard):
             return 0.0
         loss = self.air_changes / HOUR
         ages, radii = _reach(self.release, self.kind_of_gas.danger, self.diffusivity, loss)
-        return max(LEAST_DANGER, float(np.interp(time - self.start, ages, radii)))
+        return max(MIN_DANGER, float(np.interp(time - self.start, ages, radii)))
 
     @override
     def severity(self, time: float) -> float:
@@ -199,7 +199,7 @@ class LeakField(SolvedField):
     def __init__(self, leak: GasLeak, site: Site) -> None:
         super().__init__(leak, site)
         self._leak = leak
-        self._indoors = self.room != NOWHERE
+        self._indoors = self.room != NO_SPACE
         self._nodes: tuple[SitePoints, NDArray[np.int64]] | None = None
 
     @override
@@ -262,7 +262,7 @@ class LeakField(SolvedField):
     def _outdoors(self, x: float, y: float, time: float) -> float:
         """Return the plume: what is there was set free when the wind set out from the leak."""
         leak = self._leak
-        if self._indoors or self.building.space_at(x, y) != NOWHERE:
+        if self._indoors or self.building.space_at(x, y) != NO_SPACE:
             return 0.0
         dx = x - leak.position[0]
         dy = y - leak.position[1]

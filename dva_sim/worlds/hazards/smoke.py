@@ -34,7 +34,7 @@ WALL_LOSS = 0.03  # to ceiling and walls [kW/m^2/K]; assumed: plaster board afte
 DISCHARGE = 0.7  # of doorways
 SLICES = 10  # that a doorway is cut into
 HALVINGS = 10  # to find the height at which the flow turns
-MOST = 0.5  # share of a layer that may leave in one step
+MAX_LEAVING_SHARE = 0.5  # share of a layer that may leave in one step
 LOWEST = 0.05  # air is still drawn in below a layer that has come down to the floor [m]
 SOOT_EXTINCTION = 8700.0  # [m^2/kg]
 CO_RATIO = 28.96 / 28.01 * 1e6  # ppm per mass fraction
@@ -132,7 +132,7 @@ class SmokeLayers:
         out, height = self._doorways(open_, bottom[sides], kelvin[sides])
         mass = np.maximum(state[:, MASS], 1e-9)
         leaving = np.bincount(sides.ravel(), out.ravel(), len(state)) * dt / mass
-        out = out / np.maximum(1.0, leaving / MOST)[sides]
+        out = out / np.maximum(1.0, leaving / MAX_LEAVING_SHARE)[sides]
         moved = (out * dt / mass[sides])[..., None] * state[sides]
         into = sides[::-1]
         rise = np.maximum(0.0, bottom[into] - height) * (into < spaces.count)

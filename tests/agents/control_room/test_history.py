@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from dva_sim.agents.control_room.history import MOST_STEPS, EventHistory
+from dva_sim.agents.control_room.history import MAX_STEPS, EventHistory
 from dva_sim.protocol import messages as m
 
 PLACE = m.Position(38.0, -9.0)
@@ -84,8 +84,8 @@ def test_a_note_is_kept_with_its_text():
 def test_a_long_history_forgets_its_middle_and_keeps_the_report():
     history = EventHistory()
     history.hear_status(NEW, 10.0)
-    for number in range(2 * MOST_STEPS):
+    for number in range(2 * MAX_STEPS):
         history.hear_record(record("note", reason=str(number)), 11.0 + number)
-    assert len(history.steps) == MOST_STEPS
+    assert len(history.steps) == MAX_STEPS
     assert history.steps[0].what == "reported"
-    assert history.steps[-1].reason == str(2 * MOST_STEPS - 1)
+    assert history.steps[-1].reason == str(2 * MAX_STEPS - 1)

@@ -4,7 +4,13 @@ import pytest
 from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva, driving
 from helpers.wording import counted
 
-from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, SAYS_LATE_FOR, Refusals
+from dva_sim.agents.operator.refusals import (
+    LATE_FOR,
+    PASSES,
+    REFUSALS_IN_A_ROW,
+    SAYS_LATE_FOR,
+    Refusals,
+)
 from dva_sim.agents.robot.controller import LEASE_S, Mode
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
@@ -60,7 +66,7 @@ def test_word_that_all_come_late_counts_only_while_commands_are_sent(refusals):
 def test_any_other_answer_ends_it_when_it_comes_three_times_in_a_row(refusals, code):
     answers = [code, code, m.OK, code, m.STALE, code, code]
     assert [bool(refusals.answered(a, 0.0)) for a in answers] == [False] * 6 + [True]
-    assert ENOUGH == 3
+    assert REFUSALS_IN_A_ROW == 3
 
 
 def test_word_of_a_holder_counts_once_the_robot_was_ours(refusals):

@@ -14,7 +14,7 @@ from PIL import Image
 
 from dva_sim.cameras.drawing import BEST, WORST, Encoder, Eyes
 from dva_sim.cameras.frames import ALIVE, Picture, Unpacker
-from dva_sim.cameras.painting import LEAST_RATE, Painter
+from dva_sim.cameras.painting import MIN_RATE, Painter
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.scenario import Scenario, site_of
@@ -128,7 +128,7 @@ def test_robots_have_their_turns_and_no_more_pictures_than_their_rate():
         if picture := here.draw(now):
             drawn.append(picture.robot)
         now += step
-    most = max(LEAST_RATE, 1.25 * SCENARIO.camera.rate_hz) + 1
+    most = max(MIN_RATE, 1.25 * SCENARIO.camera.rate_hz) + 1
     assert 8 <= drawn.count(0) <= most
     assert abs(drawn.count(0) - drawn.count(1)) <= 1
 

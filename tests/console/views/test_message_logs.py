@@ -20,7 +20,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.serving.pipes import MOST_WAITING, LineOutbox
+from dva_sim.serving.pipes import MAX_WAITING, LineOutbox
 
 SAMPLES = ROOT / "protocol" / "samples" / "valid"
 HEADER = {"DestinationID", "MessageID", "SourceID", "Timestamp", "SessionID"}
@@ -100,12 +100,12 @@ def test_who_listens_in_this_process_has_each_exchange():
 
 def test_logs_give_way_to_all_other_lines():
     outbox = LineOutbox(KINDS)
-    for n in range(MOST_WAITING):
+    for n in range(MAX_WAITING):
         outbox.put({"k": "log", "n": n} if n % 2 else {"k": "story", "n": n})
-    outbox.put({"k": "story", "n": MOST_WAITING})
+    outbox.put({"k": "story", "n": MAX_WAITING})
     kept = [json.loads(outbox.next()) for _ in range(len(outbox))]
-    assert [one["n"] for one in kept if one["k"] == "story"] == list(range(0, MOST_WAITING + 1, 2))
-    assert [one["n"] for one in kept if one["k"] == "log"] == list(range(3, MOST_WAITING, 2))
+    assert [one["n"] for one in kept if one["k"] == "story"] == list(range(0, MAX_WAITING + 1, 2))
+    assert [one["n"] for one in kept if one["k"] == "log"] == list(range(3, MAX_WAITING, 2))
 
 
 # --- in the web process ------------------------------------------------------------------------

@@ -344,7 +344,7 @@ def test_a_disk_that_is_full_for_a_while_costs_nothing(monkeypatch, tmp_path):
         keep(kept, lines)
 
     monkeypatch.setattr(KeptRun, "_keep", full)
-    monkeypatch.setattr(kept_run, "AGAIN", 0.01)
+    monkeypatch.setattr(kept_run, "RETRY_DELAY_S", 0.01)
     assert driven(monkeypatch, tmp_path / "out").table("drives").rows == 4
     assert len(failed) == 5
 
@@ -353,7 +353,7 @@ def test_a_disk_that_stays_full_is_told_and_what_it_took_is_kept(monkeypatch, tm
     def end(results):
         killed_thread = results._kept._thread
         monkeypatch.setattr(KeptRun, "_keep", full)
-        monkeypatch.setattr(kept_run, "AGAIN", 0.01)
+        monkeypatch.setattr(kept_run, "RETRY_DELAY_S", 0.01)
         with pytest.raises(DvaSimError, match="disk is full"):
             results.write()
         assert not killed_thread.is_alive()

@@ -20,10 +20,10 @@ from dva_sim.experiments.report.figures.distribution import Distributions
 from dva_sim.experiments.report.figures.effect import Cadence, Differences, _band, _possible
 from dva_sim.experiments.report.figures.heat_map import EffectField, HeatMap
 from dva_sim.experiments.report.figures.legend import apart, columns_of
-from dva_sim.experiments.report.figures.palette import ONE
+from dva_sim.experiments.report.figures.palette import SINGLE_LOOK
 from dva_sim.experiments.report.figures.scatter import trend
 from dva_sim.experiments.report.figures.style import (
-    ASIDE,
+    NO_RESULT_LABEL,
     is_to_scale,
     log_axis,
     panel_grid,
@@ -129,7 +129,7 @@ def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
 def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
     few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
     _, ((ax,),) = panels(1, 1, 3.0)
-    _band(ax, _possible(band(few), 0.0, 240.0), ONE, 0.0)
+    _band(ax, _possible(band(few), 0.0, 240.0), SINGLE_LOOK, 0.0)
     heights = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert (heights.min(), heights.max()) == (0.0, 240.0)
     assert "are cut" in fit_to(ax, few.ravel())
@@ -139,7 +139,7 @@ def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
 def test_narrow_bands_are_shown_whole():
     _, ((ax,),) = panels(1, 1, 3.0)
     many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
-    _band(ax, band(many), ONE, 0.0)
+    _band(ax, band(many), SINGLE_LOOK, 0.0)
     before = ax.get_ylim()
     assert fit_to(ax, many.ravel()) == ""
     assert ax.get_ylim() == before
@@ -329,7 +329,7 @@ def test_bands_of_two_persons_are_cut_with_their_bounds(view):
     with styled():
         drawn = Differences().draw(asked, NOTHING_ELSE)
     (ax, *_), rows = drawn.figure.axes, drawn.csv.decode().splitlines()
-    heads = [h for h in ax.lines if len(h.get_xdata()) == 1 and h.get_label() == ASIDE]
+    heads = [h for h in ax.lines if len(h.get_xdata()) == 1 and h.get_label() == NO_RESULT_LABEL]
     bounds = [rows[0].split(",").index(f"band_{end}_s") for end in ("low", "high")]
     low, high = ax.get_ylim()
     ends = [

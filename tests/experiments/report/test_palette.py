@@ -138,8 +138,8 @@ def test_beside_patterns_nothing_has_a_colour_of_theirs():
     others = set(colours(Factor("filter", tuple(f"filter-{n}" for n in range(9)))).values())
     rest = {colour.lower() for colour in (*agents, *others, *fills)}
     assert len(patterns) == len(PATTERNS)
-    assert patterns & {palette.ONE.colour.lower(), *rest} == set()
-    assert palette.ONE.colour.lower() not in rest
+    assert patterns & {palette.SINGLE_LOOK.colour.lower(), *rest} == set()
+    assert palette.SINGLE_LOOK.colour.lower() not in rest
 
 
 def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():

@@ -20,7 +20,7 @@ def test_the_number_of_runs_is_known_without_their_list(tmp_path, text):
 def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     plan = DryRun(42, 0, 9, 1, 2, None, 0, "")
     monkeypatch.setattr(dry_run, "dry_run", lambda *_, **__: plan)
-    monkeypatch.setattr(study_runs, "_MANY", 1)
+    monkeypatch.setattr(study_runs, "_SLOW_TO_CHECK", 1)
     monkeypatch.setattr(study_runs, "_MANY_RUNS", 1)
     path = str(write_study(tmp_path))
     study_runs.plan(RunOptions(path, tmp_path / "out"))

@@ -17,7 +17,7 @@ from helpers.mutation.planting import (
     with_arguments,
 )
 
-from dva_sim.agents.robot.controller import STAND, Decision, Mode
+from dva_sim.agents.robot.controller import STANDSTILL, Decision, Mode
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.bodies import TickTarget
 
@@ -261,7 +261,7 @@ def _keeps_all_waiting(original: Original, bug: Planted) -> Original:
 
 def _taken(controller: Any, who: str, now: float) -> Decision:
     controller.by_hand, controller.last_valid = who, now
-    return Decision(m.OK, set_point=STAND)
+    return Decision(m.OK, set_point=STANDSTILL)
 
 
 def _unclamped(original: Original, bug: Planted, speed: float) -> Original:

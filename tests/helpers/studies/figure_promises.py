@@ -17,8 +17,8 @@ from helpers.studies.made_up_results import SHAPES, Shape, make_up
 from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.figures.palette import is_of_palette
 from dva_sim.experiments.report.figures.style import (
-    ASIDE,
-    LEAST_WORDS,
+    MIN_WORDS,
+    NO_RESULT_LABEL,
     WIDTH,
     Drawn,
     ReportFigure,
@@ -175,9 +175,9 @@ def _small_words(figure: Figure) -> Iterator[Case]:
     shrunk = min(1.0, WIDTH / figure.get_figwidth())
     for text in figure.findobj(Text):
         size = shrunk * float(text.get_fontsize())
-        if text.get_text().strip() and text.get_visible() and size < LEAST_WORDS - _NEAR:
+        if text.get_text().strip() and text.get_visible() and size < MIN_WORDS - _NEAR:
             words = " ".join(text.get_text().split())
-            yield SMALL, f"{words!r} in {size:.1f} pt; should be {LEAST_WORDS:g} pt"
+            yield SMALL, f"{words!r} in {size:.1f} pt; should be {MIN_WORDS:g} pt"
             return
 
 
@@ -260,7 +260,7 @@ def _points(axes: Axes) -> Iterator[tuple[str, Floats]]:
 
 def _is_aside(artist: Any) -> bool:
     """True if the artist shows no result: hidden, or marked as site, scale or reference."""
-    return not artist.get_visible() or artist.get_label() == ASIDE
+    return not artist.get_visible() or artist.get_label() == NO_RESULT_LABEL
 
 
 def _end(patch: Any) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from helpers.dva.permissions import enter
 
-from dva_sim.agents.robot.controller import PATIENCE, RobotController
+from dva_sim.agents.robot.controller import INQUIRY_WAIT_S, RobotController
 from dva_sim.agents.robot.inquiry import BURST, RATE
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.dva import Dva
@@ -207,9 +207,9 @@ def test_an_order_waits_for_the_dva_only_so_long():
     run.network.serve(DVA, lambda _: None)
     forger = Forger(run)
     forger.say(m.StartTeleOp(), STRANGER)
-    run.clock.run(10.0 + PATIENCE - 0.5)
+    run.clock.run(10.0 + INQUIRY_WAIT_S - 0.5)
     assert forger.codes == []
-    run.clock.run(10.0 + PATIENCE + 1.0)
+    run.clock.run(10.0 + INQUIRY_WAIT_S + 1.0)
     assert forger.codes == [m.NOT_PERMITTED]
 
 

@@ -5,9 +5,9 @@ from helpers.dva.permissions import enter
 from helpers.mutation.bugs import planted
 
 from dva_sim.agents.robot.controller import (
+    INQUIRY_WAIT_S,
     LEASE_S,
-    PATIENCE,
-    STAND,
+    STANDSTILL,
     Decision,
     RobotController,
     TimedSetPoint,
@@ -61,7 +61,7 @@ class InHand:
         """The robot restarts while the DVA is down, and waits as long as it waits for that."""
         self.run.dva.device.silent = True
         self.robot.restart(0.0)
-        self.let(PATIENCE)
+        self.let(INQUIRY_WAIT_S)
 
     @property
     def broken(self) -> set[str]:
@@ -147,7 +147,7 @@ def slack_watchdog(self: RobotController, who: str, speed: float, turn: float, n
 
 def takes_whatever(self: RobotController, who: str, now: float, moving: bool) -> Decision:
     self.by_hand, self.last_valid = who, now
-    return Decision(m.OK, set_point=STAND)
+    return Decision(m.OK, set_point=STANDSTILL)
 
 
 def obeys_any_hand(self: RobotController, who: str, speed: float, turn: float, now: float):

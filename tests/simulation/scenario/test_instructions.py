@@ -6,7 +6,7 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.scenario import build, load
-from dva_sim.simulation.scenario.instructions import MOST_LINES, read_instructions
+from dva_sim.simulation.scenario.instructions import MAX_LINES, read_instructions
 
 
 def scenario(folder: Path, instructions: str = "{fire: fire.md}") -> Path:
@@ -49,7 +49,7 @@ def test_a_scenario_without_instructions_is_written_as_before():
         (None, "cannot be read: No such file"),
         (b"", "have no text"),
         (b"\xff\xfe-", "are no text in UTF-8"),
-        (b"- step\n" * (MOST_LINES + 1), f"have {MOST_LINES + 1} lines"),
+        (b"- step\n" * (MAX_LINES + 1), f"have {MAX_LINES + 1} lines"),
         (b"- " + b"x" * 300, "more than 256 characters"),
     ],
 )

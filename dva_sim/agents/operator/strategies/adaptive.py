@@ -40,7 +40,9 @@ from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Intent, Reach, Route, View, gain_at
 
 GAP = 1.0  # design: a longer time between two frames is not counted as driving [s]
-AGAIN = 0.8  # design: of the liking at which one began to wait, below which one stops that
+LEAVE_WAITING_SHARE = (
+    0.8  # design: of the liking at which one began to wait, below which one stops that
+)
 
 
 class Corrections:
@@ -211,6 +213,6 @@ class Adaptive(Strategy):
             if self._has_asked:
                 self._moves.halt(now)
             self.switches += 1
-        elif self.using != "closed" and liking < AGAIN and self._moves.moves.rests:
+        elif self.using != "closed" and liking < LEAVE_WAITING_SHARE and self._moves.moves.rests:
             self.using = "closed"
             self.switches += 1

@@ -21,7 +21,9 @@ from dva_sim.agents.operator.strategies.cursor import Velocity
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Ahead, Intent, Reach, Route, View
 
-WHOLE = 0.2  # design: a move that is longer than whole periods by less of one is made faster
+WHOLE_PERIOD_SHARE = (
+    0.2  # design: a move that is longer than whole periods by less of one is made faster
+)
 Pair = tuple[float, float]
 MovePart = tuple[float, float, float]  # how long [s], and two wanted values
 
@@ -281,7 +283,7 @@ class MoveAndWait(Strategy):
         period = self.period
         if period <= self._habits.shortest_s:
             return lasts
-        return period * max(1.0, math.ceil(lasts / period - WHOLE))
+        return period * max(1.0, math.ceil(lasts / period - WHOLE_PERIOD_SHARE))
 
     def _pace(self, speed: float, turn_rate: float) -> float:
         """Return the speed of a robot, driving or turning, as a share of its limit."""

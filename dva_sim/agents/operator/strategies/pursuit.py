@@ -39,8 +39,8 @@ from dva_sim.agents.route_following import (
     wrap,
 )
 
-FAR = 16.0  # source: Salvucci 2006: gain
-NEAR = 4.0  # source: Salvucci 2006: gain
+FAR_GAIN = 16.0  # source: Salvucci 2006: gain
+NEAR_GAIN = 4.0  # source: Salvucci 2006: gain
 INTEGRAL = 3.0  # source: Salvucci 2006: gain [1/s]
 NEAR_TIME = 0.37  # source: Salvucci, Gray 2004: to the near point, on the road [s]
 FAR_TIME = 0.93  # source: Salvucci, Gray 2004: to the far point, on the road [s]
@@ -92,9 +92,9 @@ class TwoPoint(Pursuit):
         near = wrap(math.atan2(y - seen.y, x - seen.x) - seen.heading)
         counted = min(max(near, -LARGEST), LARGEST)
         slower = FAR_TIME * speed / look  # than on the road
-        change = FAR * (ahead.bearing - self._far) + NEAR * (near - self._near)
+        change = FAR_GAIN * (ahead.bearing - self._far) + NEAR_GAIN * (near - self._near)
         change += INTEGRAL * slower * counted * passed
-        self._steering += change / (FAR + NEAR)
+        self._steering += change / (FAR_GAIN + NEAR_GAIN)
         # The gain is applied to the sum: it changes while the delay is being learnt.
         self._turn_rate = gain_at(person.crossover, person.margin, view.delay) * self._steering
         self._near = near

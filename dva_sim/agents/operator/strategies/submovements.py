@@ -35,7 +35,7 @@ from collections.abc import Iterator
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed
 from dva_sim.agents.population import Person
 
-OFTEN = 1.0 / 60.0  # design: time between two frames before two were seen [s]
+USUAL_FRAME_S = 1.0 / 60.0  # design: time between two frames before two were seen [s]
 FAILS = 0.5  # design: a movement has failed if more than this share of its way is left
 STEEPNESS = 6.0  # design: of the share of movements that are waited for; persons differ as well
 
@@ -47,7 +47,7 @@ def waited_share(delay: float, patience: float) -> float:
         delay: Beyond the usual one, as it is felt [s].
         patience: Delay at which it is a half [s].
     """
-    return 1.0 / (1.0 + math.pow(patience / max(delay, OFTEN), STEEPNESS))
+    return 1.0 / (1.0 + math.pow(patience / max(delay, USUAL_FRAME_S), STEEPNESS))
 
 
 def _course(share: float) -> float:
@@ -94,7 +94,7 @@ class Submovements:
         self._lasts = 0.0
         self._way: Velocity = (0.0, 0.0)
         self._last: float | None = None
-        self._gap = OFTEN
+        self._gap = USUAL_FRAME_S
         self._pressed = -math.inf
         self._failures = 0
         self._boldness = 0.0

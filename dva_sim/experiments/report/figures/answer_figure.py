@@ -12,7 +12,7 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
 from dva_sim.experiments.report.figures.cut_bars import Bars, fit_to, mark_cuts
-from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT
+from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, SINGLE_LOOK, SOFT
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import level_name, measure_name, setting
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 _SIZE = (5.8, 3.5)  # [in]: small, so that its text stays legible beside words and on a phone
 _FONT = 10.5
-_MOST_LABELS = 8
+_MAX_LABELS = 8
 _ROOM = 0.05  # of the width, for the figures beside the outer marks
-_LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
+_MIN_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
 
 
 class AnswerFigure(style.ReportFigure):
@@ -71,7 +71,7 @@ class AnswerFigure(style.ReportFigure):
         grey = _too_small(ax, finding)
         _values(ax, finding)
         x = np.arange(len(finding.mean), dtype=np.float64)
-        mark_cuts([Bars(ax, x, finding.low, finding.high, ONE.colour)])
+        mark_cuts([Bars(ax, x, finding.low, finding.high, SINGLE_LOOK.colour)])
         sides = (finding.first, finding.second)
         first, second = (level_name(finding.factor, side) for side in sides)
         unit = f" [{finding.unit}]" if finding.unit else ""
@@ -101,17 +101,23 @@ def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
     is_open = f.is_open
     ax.axhline(0, color=INK, lw=0.8, zorder=1)
     if over is not None and over.is_numeric and style.is_to_scale(over):
-        ax.plot(x, f.mean, color=ONE.colour, lw=1, alpha=0.5, zorder=2)
-    ax.vlines(x, f.low, f.high, color=ONE.colour, lw=2.2, zorder=3)
+        ax.plot(x, f.mean, color=SINGLE_LOOK.colour, lw=1, alpha=0.5, zorder=2)
+    ax.vlines(x, f.low, f.high, color=SINGLE_LOOK.colour, lw=2.2, zorder=3)
     has_band = np.isfinite(f.low)
     little = "too little to matter" if f.smallest_effect else "not shown to differ"
     kinds = {
-        "differs from zero": (differs, ONE.colour),
+        "differs from zero": (differs, SINGLE_LOOK.colour),
         f"open: {too_few(f.persons, f.cluster)}": (is_open, PAPER),
         little: (has_band & ~differs & ~is_open, FAINT),
         "without an interval": (np.isfinite(f.mean) & ~has_band, PAPER),
     }
-    look: dict[str, Any] = {"color": ONE.colour, "ms": 7, "mew": 1.5, "marker": "o", "ls": ""}
+    look: dict[str, Any] = {
+        "color": SINGLE_LOOK.colour,
+        "ms": 7,
+        "mew": 1.5,
+        "marker": "o",
+        "ls": "",
+    }
     handles = []
     for name, (chosen, fill) in kinds.items():
         if chosen.any():
@@ -123,7 +129,7 @@ def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
 def _too_small(ax: Axes, f: Finding) -> bool:
     """Return the grey where a difference was declared too small to matter, if that can be seen."""
     bottom, top = ax.get_ylim()
-    if f.smallest_effect is None or f.smallest_effect < _LEAST_SHARE * (top - bottom):
+    if f.smallest_effect is None or f.smallest_effect < _MIN_SHARE * (top - bottom):
         return False
     ax.axhspan(-f.smallest_effect, f.smallest_effect, color=FAINT, alpha=0.6, lw=0, zorder=0)
     ax.set_ylim(bottom, top)
@@ -132,7 +138,7 @@ def _too_small(ax: Axes, f: Finding) -> bool:
 
 def _values(ax: Axes, f: Finding) -> None:
     """Write each mean in figures, beside its mark."""
-    if len(f.mean) > _MOST_LABELS:
+    if len(f.mean) > _MAX_LABELS:
         return
     there = present(f.mean)
     rises = bool(f.over) and there[-1] > there[0]  # then the line is in the way on the right

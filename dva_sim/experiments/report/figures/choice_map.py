@@ -16,7 +16,7 @@ from dva_sim.experiments.report.choice_table import (
 )
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
-from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT
+from dva_sim.experiments.report.figures.palette import INK, PAPER, SINGLE_LOOK, SOFT
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 _ROW = 0.36  # height of a situation [in]
-_ACROSS = 100  # characters that the heads of all columns hold side by side
+_HEAD_CHARACTERS = 100  # characters that the heads of all columns hold side by side
 _WORDS = 8.5  # in a cell [pt]
 _SMALL_WORDS = 6.8  # in a cell where there are many columns side by side [pt]
-_MANY = 8  # columns
+_TALL_FROM_COLUMNS = 8  # columns
 _FAINT = 0.12  # colour of the least regret
 _STRONG = 0.85  # colour of the greatest regret
 _DECADES = 2.0  # from the least coloured regret to the full colour
@@ -62,7 +62,7 @@ class ChoiceMapFigure(style.ReportFigure):
         figure, ((ax,),) = style.panels(1, 1, 1.2 + _ROW * len(down))
         ax.set_xlim(-0.5, len(across) - 0.5)
         _paint(ax, choice_map)
-        width = min(14, _ACROSS // len(across))
+        width = min(14, _HEAD_CHARACTERS // len(across))
         ax.set_xticks(range(len(across)), [style.wrapped(name, width) for name in across])
         ax.xaxis.tick_top()
         ax.set_yticks(range(len(down)), down)
@@ -103,9 +103,9 @@ def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bo
     from matplotlib.patches import Rectangle
 
     x, y = place
-    is_narrow = ax.get_xlim()[1] > _MANY
+    is_narrow = ax.get_xlim()[1] > _TALL_FROM_COLUMNS
     corner = (x - 0.47, y - 0.44)
-    colour = ONE.colour
+    colour = SINGLE_LOOK.colour
     ax.add_patch(Rectangle(corner, 0.94, 0.88, facecolor=colour, alpha=shade, edgecolor="none"))
     ax.text(
         x,

@@ -9,7 +9,7 @@ from dva_sim.experiments.analysis.hypothesis_tests import Tested, Verdict
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
-from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT
+from dva_sim.experiments.report.figures.palette import INK, PAPER, SINGLE_LOOK, SOFT
 from dva_sim.experiments.report.hypothesis_tables import verdict_of_name
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.results.manifest import status_of
@@ -75,9 +75,9 @@ def _axes(rows: int) -> tuple[Drawing, Axes]:
 def _mark(ax: Axes, row: int, claim: Tested) -> None:
     difference = claim.difference
     assert difference is not None
-    face = ONE.colour if claim.verdict in _FILLED else PAPER
-    ax.hlines(row, difference.low, difference.high, color=ONE.colour, lw=2.5)
-    ax.plot(difference.mean, row, "o", ms=9, color=face, mec=ONE.colour, mew=2, zorder=3)
+    face = SINGLE_LOOK.colour if claim.verdict in _FILLED else PAPER
+    ax.hlines(row, difference.low, difference.high, color=SINGLE_LOOK.colour, lw=2.5)
+    ax.plot(difference.mean, row, "o", ms=9, color=face, mec=SINGLE_LOOK.colour, mew=2, zorder=3)
     text = signed(difference.mean, unit_of(claim.contrast.measure))
     ax.annotate(text, (difference.mean, row), (0, 9), textcoords="offset points", ha="center")
 

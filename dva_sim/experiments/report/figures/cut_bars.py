@@ -15,7 +15,7 @@ from dva_sim.kernel.wording import number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-from dva_sim.experiments.report.figures.style import ASIDE
+from dva_sim.experiments.report.figures.style import NO_RESULT_LABEL
 
 _ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 
@@ -86,7 +86,12 @@ def mark_cuts(every: Sequence[Bars]) -> None:
 
 def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: str) -> None:
     """Draw an arrow head at an edge; of several bounds at one stop one stands below the other."""
-    look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
+    look: dict[str, Any] = {
+        "color": bars.colour,
+        "label": NO_RESULT_LABEL,
+        "clip_on": False,
+        "zorder": 6,
+    }
     if bars.along == "y":
         place = (at, edge)
         mark = "v^"[side > 0]

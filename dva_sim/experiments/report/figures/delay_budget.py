@@ -121,20 +121,20 @@ def _parts(stages: list[str]) -> dict[str, Artist]:
 _HALF = 0.36  # of a bar's width, in stops
 
 
-_ABREAST = 4  # panels
+_PANELS_A_ROW = 4  # panels
 
 
 _BAR = 0.2  # height of a bar with the gap to the next [in]
 
 
-_AROUND = 0.85  # height of a panel's title and axis [in]
+_FRAME_HEIGHT_IN = 0.85  # height of a panel's title and axis [in]
 
 
 _TITLE = 72  # characters of titles that stand abreast
 
 
 _PER_INCH = 13  # characters of a factor's name along the height
-_LEAST = 12  # characters of it, at least
+_MIN_CHARACTERS = 12  # characters of it, at least
 
 
 _NAME = 24  # characters of a stop's name in a line
@@ -155,12 +155,12 @@ class Stacks:
     def __init__(self, view: StudyView, label: str, parts: Mapping[str, Artist]) -> None:
         count = len(view.lines)
         lines = len(view.stops)
-        columns = min(_ABREAST, count)
+        columns = min(_PANELS_A_ROW, count)
         deep = -(-count // columns)
         if view.over is not None:
             lines = len(view.stops) * _most_lines(view.over)
         rows = deep * len(view.shown)
-        height = _AROUND + _BAR * lines + key_height(list(parts)) / rows
+        height = _FRAME_HEIGHT_IN + _BAR * lines + key_height(list(parts)) / rows
         self.figure: Figure
         self.figure, grid = style.panels(rows, columns, height, sharex=True, sharey=True)
         key(self.figure, list(parts.values()), list(parts))
@@ -231,7 +231,7 @@ def _along_y(ax: Axes, over: Factor | None, is_first: bool) -> None:
     style.level_axis(ax, over, _NAME)
     ax.invert_yaxis()
     height = _BAR * len(over.levels) * _most_lines(over)
-    words = style.wrapped(ax.get_ylabel(), max(_LEAST, int(_PER_INCH * height)))
+    words = style.wrapped(ax.get_ylabel(), max(_MIN_CHARACTERS, int(_PER_INCH * height)))
     ax.set_ylabel(words if is_first else "")
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 _CROWD = 60  # runs of a cell from which on dots must be small
-_FEWEST = 5  # runs of a cell: quarters of fewer are made up between them
+_MIN_RUNS = 5  # runs of a cell: quarters of fewer are made up between them
 _GOLDEN = 0.6180339887498949
 
 
@@ -106,7 +106,7 @@ def _dots(
 
 def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
     """Draw median and middle half of each stop `(stops, runs)` with runs enough for them."""
-    stops = np.flatnonzero(np.isfinite(values).sum(axis=1) >= _FEWEST)
+    stops = np.flatnonzero(np.isfinite(values).sum(axis=1) >= _MIN_RUNS)
     if not len(stops):
         return
     low, middle, high = np.nanquantile(values[stops], [0.25, 0.5, 0.75], axis=1)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_MOST_STOPS = 4
-_MOST_LINES = 3
+_MAX_STOPS = 4
+_MAX_LINES = 3
 _POINTS = 241
 _TITLE = 70  # characters that the width holds
 
@@ -46,9 +46,9 @@ class EndingsInTime(style.ReportFigure):
         if endings is None:
             return None
         others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
-        lines = tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MOST_LINES]
+        lines = tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MAX_LINES]
         stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][
-            -_MOST_STOPS:
+            -_MAX_STOPS:
         ]
         if not stops:
             return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
-from dva_sim.experiments.analysis.study_view import MOST_PANELS, StudyView
+from dva_sim.experiments.analysis.study_view import MAX_PANELS, StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_FEWEST = 3  # levels of a second factor, below which panels say it all
+_MIN_LEVELS = 3  # levels of a second factor, below which panels say it all
 
 
-_MOST_WRITTEN = 12  # levels along x, beyond which numbers have no room
+_MAX_WRITTEN = 12  # levels along x, beyond which numbers have no room
 
 
 _DARK = 0.65  # of the strongest colour, from where on writing is white
 
 
-_ABOVE = "▲"
-_BELOW = "▼"
+_MARK_ABOVE = "▲"
+_MARK_BELOW = "▼"
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class HeatMap(style.ReportFigure):
         bar = figure.colorbar(image, ax=axes, pad=0.02)
         bar.set_label(style.axis_label(view.measure, f"{first}\nminus {other}"))
         title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
-        marks = {"above": _ABOVE, "below": _BELOW}
+        marks = {"above": _MARK_ABOVE, "below": _MARK_BELOW}
         words = caption("heat_map", first=first, second=other, has_zero=has_zero, **marks)
         return self.finish(figure, words, _heat_numbers(view, fields), title=title)
 
@@ -107,7 +107,7 @@ def _fields(view: StudyView) -> list[EffectField]:
         return []
     rest = [{k: v for k, v in panel.items() if k != second.name} for panel in view.panels]
     settings = [panel for n, panel in enumerate(rest) if panel not in rest[:n]]
-    fields = [_field(view, second, view.contrast, panel) for panel in settings[:MOST_PANELS]]
+    fields = [_field(view, second, view.contrast, panel) for panel in settings[:MAX_PANELS]]
     return [field for field in fields if np.isfinite(field.mean).any()]
 
 
@@ -127,7 +127,7 @@ def _second(view: StudyView) -> Factor | None:
     if view.line is None or view.over is None or len(view.over.levels) < 2:
         return None
     others = [f for f in view.part.factors if f not in (view.line, view.over)]
-    worth = [f for f in others if len(f.levels) >= _FEWEST]
+    worth = [f for f in others if len(f.levels) >= _MIN_LEVELS]
     return max(worth, key=lambda f: (len(f.levels), f.is_numeric), default=None)
 
 
@@ -150,8 +150,8 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
         if not np.isfinite(mean):
             continue
         paint = image.to_rgba(np.asarray(field.shown[y, x]))
-        mark = _ABOVE if field.low[y, x] > 0 else _BELOW if field.high[y, x] < 0 else ""
-        text = number(float(mean)) if field.mean.shape[1] <= _MOST_WRITTEN else ""
+        mark = _MARK_ABOVE if field.low[y, x] > 0 else _MARK_BELOW if field.high[y, x] < 0 else ""
+        text = number(float(mean)) if field.mean.shape[1] <= _MAX_WRITTEN else ""
         ax.text(
             x,
             y,

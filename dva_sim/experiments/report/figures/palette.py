@@ -65,7 +65,7 @@ LOOKS = (
     *(_BLUE, _VERMILION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK, _VIOLET),
     *(_BROWN, _OLIVE, _PLUM, _CRIMSON, _NAVY, _MINT, _LILAC),
 )
-ONE = Look(_VIOLET.colour, "o")  # a difference, or what stands alone
+SINGLE_LOOK = Look(_VIOLET.colour, "o")  # a difference, or what stands alone
 
 _OF_PATTERNS = (_VERMILION, _PURPLE, _BROWN, _BLUE, _GREEN)
 _FREE = (  # of levels without a look of their own, in turn; those of patterns come last
@@ -139,7 +139,7 @@ def looks(factor: Factor | None) -> dict[Level, Look]:
     One's own, wherever it appears, or one that no other here has.
     """
     if factor is None:
-        return {None: ONE}
+        return {None: SINGLE_LOOK}
     own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
     taken = {look.colour for look in own.values()}
     free = [look for look in _FREE if look.colour not in taken] or list(_FREE)
@@ -162,4 +162,4 @@ def is_of_palette(colour: str) -> bool:
 
 def look_of(name: str) -> Look:
     """Return the style for a kind of agent, or the default."""
-    return _OWN.get(name, ONE)
+    return _OWN.get(name, SINGLE_LOOK)

@@ -12,7 +12,7 @@ from dva_sim.experiments.analysis.study_view import StudyView, part_of
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
 from dva_sim.experiments.report.figures.legend import legend
-from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, Look, looks
+from dva_sim.experiments.report.figures.palette import INK, PAPER, SINGLE_LOOK, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_ABREAST = 3
+_PANELS_A_ROW = 3
 _BINS = 8  # of equally many points, through whose means the trend is drawn
-_FEWEST_IN_BIN = 6
+_MIN_IN_BIN = 6
 
 
 class Cloud(NamedTuple):
@@ -105,12 +105,14 @@ class Scatter(style.ReportFigure):
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         ranges = (reading.study.get("design") or {}).get("ranges") or {}
-        abreast = min(_ABREAST, len(names))
+        abreast = min(_PANELS_A_ROW, len(names))
         figure, grid, axes = style.places(len(names), abreast, 2.7, sharey=True)
         means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
         for ax, name, x in zip(axes, names, where, strict=True):
             for cloud, y in zip(clouds, means, strict=True):
-                _dots(ax, x, y, ONE if cloud.level is None else looks(view.line)[cloud.level])
+                _dots(
+                    ax, x, y, SINGLE_LOOK if cloud.level is None else looks(view.line)[cloud.level]
+                )
             ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
             if (ranges.get(name) or {}).get("scale") == "log":
                 style.log_axis(ax, "x")
@@ -160,7 +162,7 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """
     from scipy.stats import t
 
-    parts = min(_BINS, len(x) // _FEWEST_IN_BIN)
+    parts = min(_BINS, len(x) // _MIN_IN_BIN)
     if parts < 2:
         return np.array([]), np.array([]), np.array([])
     order = np.array_split(np.argsort(x, kind="stable"), parts)

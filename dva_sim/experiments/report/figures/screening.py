@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dva_sim.experiments.analysis.screening import Screening
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE
+from dva_sim.experiments.report.figures.palette import FAINT, INK, SINGLE_LOOK
 from dva_sim.experiments.study.screening import rule_of
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.assumed import Assumption
@@ -54,7 +54,7 @@ def _draw(screening: Screening, label: str, path: Path) -> None:
         mean = each.mean
         ax.barh(row, 2 * each.size, left=-each.size, height=0.55, color=FAINT, zorder=1)
         ax.plot([mean.low, mean.high], [row, row], color=INK, linewidth=1.5, zorder=2)
-        ax.plot([mean.mean], [row], "o", color=ONE.colour, zorder=3)
+        ax.plot([mean.mean], [row], "o", color=SINGLE_LOOK.colour, zorder=3)
     ax.axvline(0.0, color=INK, linewidth=0.8)
     ax.set_yticks(rows, [f"{_called(number)}\n{_band(number)}" for number, _ in most])
     ax.set_xlabel(f"Effect of the whole band on\n{label}")

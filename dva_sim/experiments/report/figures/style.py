@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
 _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
-_LEAST_TICK = 8  # characters of a tick's name in a line
-_MOST_UPRIGHT = 7  # names of levels side by side; more are turned
+_MIN_TICK = 8  # characters of a tick's name in a line
+_MAX_UPRIGHT = 7  # names of levels side by side; more are turned
 _ROW_LABEL = 28  # characters that the height of a row holds
-ASIDE = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
-LEAST_WORDS = 6.0  # [pt] in this width
+NO_RESULT_LABEL = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
+MIN_WORDS = 6.0  # [pt] in this width
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
 
 _STYLE: dict[str, Any] = {
@@ -202,8 +202,8 @@ def stops_axis(axes: Axes, over: Factor | None) -> None:
         axes.set_xlim(-0.5, 0.5)
         return
     names, unit = tick_names(over)
-    narrow = max(_LEAST_TICK, _TITLE // len(names))
-    if over.is_numeric or len(names) <= _MOST_UPRIGHT:
+    narrow = max(_MIN_TICK, _TITLE // len(names))
+    if over.is_numeric or len(names) <= _MAX_UPRIGHT:
         axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
     else:
         axes.set_xticks(range(len(names)), names, rotation=30, ha="right", rotation_mode="anchor")
@@ -319,7 +319,7 @@ def _make_room(axes: Axes, columns: int) -> None:
     axes.set_xlabel(wrapped(axes.get_xlabel(), _TITLE // columns))
     names = [label.get_text() for label in axes.get_xticklabels()]
     if columns * sum(map(len, names)) > _CROWDED:
-        narrow = max(_LEAST_TICK, _TITLE // (columns * len(names)))
+        narrow = max(_MIN_TICK, _TITLE // (columns * len(names)))
         words = [wrapped(name.replace("\n", " "), narrow) for name in names]
         axes.set_xticks(axes.get_xticks(), words, fontsize=7)
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_BELOW = 0.3  # of that room, below: there is little that is less than none
-_NEAR = 0.05  # share of an axis, below which two names would be written over each other
+_ROOM_BELOW = 0.3  # of that room, below: there is little that is less than none
+_NAME_GAP_SHARE = 0.05  # share of an axis, below which two names would be written over each other
 _ROOM = 0.15  # share of what persons span that is left free beyond them
 EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
@@ -95,7 +95,7 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
         seen = present(np.concatenate([values.ravel() for values in every]))
         room = _ROOM * (float(np.ptp(seen)) or 1.0)
         low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
-        low = max(low, seen.min() - _BELOW * room)
+        low = max(low, seen.min() - _ROOM_BELOW * room)
         high = min(high, seen.max() + room)
         ax.set(**{f"{name}lim": (low, high)})
 
@@ -121,7 +121,7 @@ def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
     named: list[int] = []
     for stop in (0, len(x) - 1) if style.leads_on(view) else range(len(x)):
         gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]
-        if any(max(gap) < _NEAR for gap in gaps):
+        if any(max(gap) < _NAME_GAP_SHARE for gap in gaps):
             continue
         named.append(stop)
         ax.annotate(

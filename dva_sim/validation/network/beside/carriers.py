@@ -28,7 +28,7 @@ from dva_sim.network.middleware import CommandTransport
 from dva_sim.network.middleware.mqtt import COMMANDS, PICTURES, MqttTransport
 from dva_sim.network.middleware.programs import TELE_OP
 from dva_sim.network.middleware.udp import UdpTransport
-from dva_sim.network.middleware.websocket import MOST_WAITING, WebSocketTransport
+from dva_sim.network.middleware.websocket import MAX_WAITING, WebSocketTransport
 from dva_sim.network.middleware.zenoh import ZenohTransport
 from dva_sim.network.middleware.zeromq import ZeroMqTransport
 from dva_sim.network.tcp import OrderedMessages, TcpConnection, TcpOptions
@@ -233,7 +233,7 @@ class StreamCarrier(Carrier):
             self._send(self._connection.down, number, self.between.picture_bytes, False)
 
     def _send(self, stream: OrderedMessages, number: int, size: int, up: bool) -> bool:
-        if stream.waiting > MOST_WAITING:
+        if stream.waiting > MAX_WAITING:
             return False
         stream.send(number, size + self._header(size, up))
         return True

@@ -220,7 +220,7 @@ class Table(AbstractContextManager["Table"]):
 
 _IDENTITY = ("cell", "group", "seed", "cond_id")
 _OVERHEAD_S = 1.5  # processes, handshake and waiting, about
-_MOST_FAILURES = 3  # in a row
+_MAX_FAILURES = 3  # in a row
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ def measure_all(
             except EmulatorError as error:
                 failures.append(f"{cell}: {error}")
                 in_a_row += 1
-                if in_a_row == _MOST_FAILURES:
+                if in_a_row == _MAX_FAILURES:
                     raise
             tell(Progress(done, len(plan), _time_of(left[turn:])))
     return failures
