@@ -148,11 +148,11 @@ class Screens:
             if id_tag != robot and math.dist(here, (pose.x, pose.y)) < self._reach:
                 mode = other.controller.mode.value
                 figures.append(self._figure("robot", id_tag, pose.x, pose.y, pose.heading, mode))
-        for name, who in field.people():
-            x, y = who.walking.place
-            if who.activity != SAFE and math.dist(here, (x, y)) < self._reach:
-                kind = "guard" if hasattr(who, "device") else "bystander"
-                figures.append(self._figure(kind, name, x, y, who.heading, who.activity))
+        for name, agent in field.people():
+            x, y = agent.walking.place
+            if agent.activity != SAFE and math.dist(here, (x, y)) < self._reach:
+                kind = "guard" if hasattr(agent, "device") else "bystander"
+                figures.append(self._figure(kind, name, x, y, agent.heading, agent.activity))
         return figures
 
     def _figure(

@@ -106,10 +106,12 @@ def tell_verdicts(verdicts: Iterable[GateVerdict], console: Console) -> None:
 def _verdict(verdict: GateVerdict) -> str:
     where = ", ".join(filter(None, (verdict.part, brief(dict(verdict.levels)))))
     values = f"A {verdict.first:.5g}, B {verdict.second:.5g}, bound {verdict.bound:.5g}"
-    here, there = verdict.missing
-    if here == there:
+    missing_a, missing_b = verdict.missing
+    if missing_a == missing_b:
         return f"{where}: {values}"
-    return f"{where}: {values}; without a value: A {100 * here:.3g} %, B {100 * there:.3g} %"
+    return (
+        f"{where}: {values}; without a value: A {100 * missing_a:.3g} %, B {100 * missing_b:.3g} %"
+    )
 
 
 def _questions(comparison: Comparison) -> list[str]:

@@ -252,9 +252,9 @@ def _shift_lines(recording: TimedRecording) -> Iterator[str]:
         columns = recording.columns
         here = recording.measured
         response = (columns["arrived"] - columns["detected"])[here]
-        there = response[np.isfinite(response)]
-        if len(there):
-            median, late = np.percentile(there, [50, 90])
+        times = response[np.isfinite(response)]
+        if len(times):
+            median, late = np.percentile(times, [50, 90])
             yield f"on scene after {median:.1f} s (median), {late:.1f} s (90 % of those reached)"
     for kind in ("guard", "robot"):
         units = [n for n, unit in enumerate(recording.units) if unit.kind == kind]
@@ -351,12 +351,12 @@ def _count(trials: int) -> str:
 
 
 def _first_trials(trials: Sequence[Row]) -> Table:
-    there = {name: head for name, head in COLUMNS.items() if name in trials[0]}
-    heads = ["trial", *map(_head, list(trials[0])[2:4]), *there.values()]
+    heads_shown = {name: head for name, head in COLUMNS.items() if name in trials[0]}
+    heads = ["trial", *map(_head, list(trials[0])[2:4]), *heads_shown.values()]
     table = _table(heads, right=heads, no_wrap=True)
     for trial in trials[:TRIALS]:
         first, second = list(trial.values())[2:4]
-        values = (_number(trial[name]) for name in there)
+        values = (_number(trial[name]) for name in heads_shown)
         table.add_row(str(trial["number"] + 1), f"{first:.4g}", f"{second:.4g}", *values)
     return table
 
@@ -432,11 +432,11 @@ def replay(
             tell_outcome(opened.tables, how, where, verdicts)
         elif unjudged_rules(verdicts):
             print_lines([_unjudged(verdicts)], where)
-        there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
+        length = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
         if is_part(file):
-            there = f"{run.duration:.0f} s are there; the run was interrupted or is still running"
+            length = f"{run.duration:.0f} s are there; the run was interrupted or is still running"
         if is_part(file) or not opened.is_whole:
-            where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
+            where.print(f"[yellow]{file} was cut short: {length}[/yellow]", soft_wrap=True)
         made = [] if mcap is None else [f"Recording: {mcap}"]
         _say_written(chain(made, write_replay(opened, pictures, ros2)), pictures, where)
     if unjudged := unjudged_rules(verdicts):

@@ -41,8 +41,12 @@ def proposal(dispatcher: Dispatcher, event: Event, now: float) -> m.Proposal:
     )
 
 
-def _earliest_first(who: m.Candidate) -> tuple[bool, float, str]:
-    return who.reason != FREE, math.inf if who.arrival_in is None else who.arrival_in, who.device
+def _earliest_first(candidate: m.Candidate) -> tuple[bool, float, str]:
+    return (
+        candidate.reason != FREE,
+        math.inf if candidate.arrival_in is None else candidate.arrival_in,
+        candidate.device,
+    )
 
 
 def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate]) -> str:
@@ -133,9 +137,9 @@ def _why_not_a_robot(dispatcher: Dispatcher, robot: str, event: Event, now: floa
 def _as_many_as_fit(everybody: list[m.Candidate]) -> tuple[m.Candidate, ...]:
     named: list[m.Candidate] = []
     room = LIST_BYTES
-    for who in everybody[:MAX_NAMED]:
-        room -= CANDIDATE_BYTES + xml_size(who.label) + xml_size(who.reason)
+    for candidate in everybody[:MAX_NAMED]:
+        room -= CANDIDATE_BYTES + xml_size(candidate.label) + xml_size(candidate.reason)
         if room < 0:
             break
-        named.append(who)
+        named.append(candidate)
     return tuple(named)

@@ -274,13 +274,13 @@ class ControlRooms:
 
     def _may_look(self, body: m.Assign, event: Event) -> None:
         """Refuse to take anybody from a scene, or from the way but by who knows of it."""
-        who = self._orders.label_of(event.responder or "")
+        label = self._orders.label_of(event.responder or "")
         if event.state is State.CONFIRMED:
             raise _Refused(m.WRONG_MODE, f"event {event.number} is confirmed: somebody has looked")
         if event.state is State.ON_SCENE and not self._passes_on(body, event):
-            raise _Refused(m.BUSY, f"{who} is there already: take it off first")
+            raise _Refused(m.BUSY, f"{label} is there already: take it off first")
         if event.state in LOOKING and body.decisions is None:
-            raise _Refused(m.BUSY, f"{who} is on the way; to send another, include Decisions")
+            raise _Refused(m.BUSY, f"{label} is on the way; to send another, include Decisions")
 
     def _may_act(self, body: m.Assign, event: Event, device: m.Device, task: str) -> None:
         if not event.needs_containment:
@@ -293,8 +293,8 @@ class ControlRooms:
         if event.state is State.PENDING:
             raise _Refused(m.WRONG_MODE, "nobody looks there yet: send somebody to first")
         if event.actor is not None and body.decisions is None:
-            who = self._orders.label_of(event.actor)
-            raise _Refused(m.BUSY, f"{who} has it; state Decisions to send another instead")
+            label = self._orders.label_of(event.actor)
+            raise _Refused(m.BUSY, f"{label} has it; state Decisions to send another instead")
 
     def _driver(self, body: m.Assign, robot: m.Device, sender: m.Device, now: float) -> str:
         """Choose the driver of a robot: the one the sender names, or the least busy one."""

@@ -272,7 +272,7 @@ class Dispatcher:
         idle = view.team.idle().difference(self.orders.engaged)
         able = np.isfinite(view.situation.eta[offer.task])
         both = zip(view.situation.responders, able, strict=True)
-        bidders = [who.device for who, can in both if can and who.device in idle]
+        bidders = [responder.device for responder, can in both if can and responder.device in idle]
         if not bidders:
             return None
         self.orders.counters["auctions"] += 1

@@ -74,8 +74,8 @@ class Handovers:
         engaged = self.orders.engaged
         for event in engaged.all(robot):
             if not engaged.is_at(asker, event):
-                who = event.operator or robot
-                return self._named(who, now - event.times.get("assigned", now))
+                holder_id = event.operator or robot
+                return self._named(holder_id, now - event.times.get("assigned", now))
         return None
 
     def _named(self, device: str, held_for: float) -> m.Holder:

@@ -199,8 +199,8 @@ class Orders:
 
         A DVA that has lost an order in a crash may have given the same operator another robot.
         """
-        there = "act_arrived" if device == event.actor else "arrived"
-        return there in event.times or self._is_near(event, device)
+        arrival_step = "act_arrived" if device == event.actor else "arrived"
+        return arrival_step in event.times or self._is_near(event, device)
 
     def _is_near(self, event: Event, device: str) -> bool:
         within = self.rules.arrived_within
@@ -321,9 +321,9 @@ class Orders:
             owes = self._owes(device, event)
             if owes == MOVE and (others or device in self.unwatched):
                 continue
-            who = device if device == event.actor else event.responder
-            if owes and who is not None:
-                yield Promise(device, event, owes, self.registry.entries[who].position)
+            responder = device if device == event.actor else event.responder
+            if owes and responder is not None:
+                yield Promise(device, event, owes, self.registry.entries[responder].position)
 
     @staticmethod
     def _owes(device: str, event: Event) -> str:

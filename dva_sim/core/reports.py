@@ -191,8 +191,8 @@ class Reports:
         others = event.sources.keys() - {robot}
         self.events.merge(event, 0.0)
         self.events.note_source(event, robot, CONFIDENCE)
-        there = apart(event.position, place) < self.dispatcher.orders.rules.merge_distance
-        if not (there and others) or event.state is State.CONFIRMED:
+        is_near = apart(event.position, place) < self.dispatcher.orders.rules.merge_distance
+        if not (is_near and others) or event.state is State.CONFIRMED:
             return DvaAnswer()
         counters["event confirmed by a sensor"] += 1
         sends = self.dispatcher.orders.transition(event, Cause.SENSED, now)

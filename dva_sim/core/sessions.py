@@ -197,8 +197,8 @@ class Sessions:
     def remind(self, is_there: Callable[[str], bool]) -> None:
         """Tell the robots again that have not heard, as soon as they are there."""
         self._unheard = {s: send for s, send in self._unheard.items() if s in self.unacknowledged}
-        there = [s for s, send in self._unheard.items() if is_there(send.to)]
-        self._over += [self._unheard.pop(session) for session in there]
+        heard = [s for s, send in self._unheard.items() if is_there(send.to)]
+        self._over += [self._unheard.pop(session) for session in heard]
 
     def with_something_open(self) -> set[str]:
         """Return robots that somebody holds, or that must still hear that a session is over."""

@@ -231,12 +231,12 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if isinstance(piece, Announcement):
             self._mask[self._announcements + piece.task] = 0
             return
-        who = situation.responders[piece.responder]
+        responder = situation.responders[piece.responder]
         unit = self._places[piece.responder]
         self._bar(unit)
         if isinstance(piece, Assignment):
             self._mask[1 + piece.task * self._units :][: self._units] = 0
-            if who.kind == "robot" and who.engaged is None:
+            if responder.kind == "robot" and responder.engaged is None:
                 self._operators -= 1
                 if self._operators <= 0:
                     self._bar_idle_robots(situation)
@@ -247,8 +247,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         self._mask[first : first + self._stations] = 0
 
     def _bar_idle_robots(self, situation: Situation) -> None:
-        for place, who in zip(self._places, situation.responders, strict=True):
-            if who.kind == "robot" and who.engaged is None:
+        for place, responder in zip(self._places, situation.responders, strict=True):
+            if responder.kind == "robot" and responder.engaged is None:
                 self._mask[1 + place : self._announcements : self._units] = 0
 
     # --- a decision ----------------------------------------------------------------------
@@ -271,7 +271,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if situation is None:
             return
         numbers = {device: n for n, device in enumerate(self._running().units)}
-        self._places = [numbers[who.device] for who in situation.responders]
+        self._places = [numbers[responder.device] for responder in situation.responders]
         self._operators = situation.operators
         pairs = self._mask[1 : self._announcements].reshape(self._tasks, self._units)
         for row, task in enumerate(situation.tasks[: self._tasks]):
@@ -343,8 +343,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                 max(0.0, now - task.waiting_since),
                 task.engaged is not None,
             )
-        for place, who in zip(self._places, situation.responders, strict=True):
-            seen["units"][place] = 1.0, who.kind == "robot", who.engaged is not None
+        for place, responder in zip(self._places, situation.responders, strict=True):
+            seen["units"][place] = 1.0, responder.kind == "robot", responder.engaged is not None
         seen["operators"][0] = self._operators
         rows = slice(len(tasks))
         for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):

@@ -168,8 +168,8 @@ class Plugins(Generic[T]):
         ]
         for option in options:
             if option not in parameters_named:
-                there = hint(option, parameters_named) if parameters_named else "it has none"
-                raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {there}")
+                suggestion = hint(option, parameters_named) if parameters_named else "it has none"
+                raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {suggestion}")
 
     # --- files -------------------------------------------------------------------------
 
@@ -185,10 +185,9 @@ class Plugins(Generic[T]):
         plugin = vars(module).get(class_name)
         if plugin is None:
             classes = [c for c in vars(module).values() if isinstance(c, type)]
-            there = [c.__name__ for c in classes if c.__module__ == module.__name__]
-            problem = (
-                f"there is no class {class_name!r} in {path}; {hint(class_name, there, 'classes')}"
-            )
+            class_names = [c.__name__ for c in classes if c.__module__ == module.__name__]
+            suggestion = hint(class_name, class_names, "classes")
+            problem = f"there is no class {class_name!r} in {path}; {suggestion}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}")
         return self._right_class(name, plugin)
 

@@ -146,10 +146,10 @@ def refuse_to_replace(
     Raises:
         ConfigError: something is there.
     """
-    there = [path for path in paths if path.is_symlink() or path.exists()]
-    if there and not overwrite:
-        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
-        raise ConfigError(f"{there[0]}{more} would be replaced; {way}")
+    existing = [path for path in paths if path.is_symlink() or path.exists()]
+    if existing and not overwrite:
+        more = f" and {len(existing) - 1} more" if len(existing) > 1 else ""
+        raise ConfigError(f"{existing[0]}{more} would be replaced; {way}")
 
 
 def is_file(path: Path) -> bool:

@@ -71,20 +71,20 @@ def _is_numbered(one: str, other: str) -> bool:
     return one != other and digits.sub("0", one) == digits.sub("0", other)
 
 
-def hint(given: str, known: Iterable[str], there: str = "known") -> str:
+def hint(given: str, known: Iterable[str], heading: str = "known") -> str:
     """Return `did you mean 'x'?`; if no guess is good what there is, but not too much of it."""
     names = list(known)
     near = guess(given, names)
-    return f"did you mean {near!r}?" if near is not None else f"{there}: {listed(names)}"
+    return f"did you mean {near!r}?" if near is not None else f"{heading}: {listed(names)}"
 
 
-def unknown(what: str, given: object, known: Iterable[str], there: str = "known") -> str:
+def unknown(what: str, given: object, known: Iterable[str], heading: str = "known") -> str:
     """Say that a name is unknown, and suggest the closest one or list the known ones.
 
     Of a retired name, say what to use instead.
     """
     instead = use_now(what, str(given))
-    return instead or f"{what} {given!r} is unknown; {hint(str(given), known, there)}"
+    return instead or f"{what} {given!r} is unknown; {hint(str(given), known, heading)}"
 
 
 def listed(names: Iterable[object], most: int = _LISTED) -> str:

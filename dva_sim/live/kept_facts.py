@@ -14,7 +14,7 @@ def keep_events(recorder: LiveRecorder, events: EventTable) -> None:
     """Record how the events stand: the last that were closed, and all that are open."""
     for e in (*events.closed.values(), *events.open.values()):
         at = [e.position.latitude, e.position.longitude]
-        sent = {who: getattr(e, who) for who in SENT}
+        sent = {role: getattr(e, role) for role in SENT}
         facts = e.number, e.kind, at, e.state.value, dict(e.times), e.severity, sent
         recorder.put_new("event", *facts, key=f"event {e.number}")
 

@@ -253,8 +253,8 @@ class RunLines:
         return self.recorder.traffic
 
     def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
-        robot, who, event, ordered, started, ended, outcome = facts
-        log = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
+        robot, driver, event, ordered, started, ended, outcome = facts
+        log = self._drives.setdefault((operator, number), DriveLog(robot, driver, event, ordered))
         log.started = started
         log.ended = ended
         log.outcome = outcome

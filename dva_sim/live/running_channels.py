@@ -160,15 +160,15 @@ class RunningChannels:
                 yield channels.latency(when, robot, "command", delay=when - issued)
 
     def _drive(self, operator: str, number: int, facts: Line) -> None:
-        robot, who = facts[:2]
-        names = {robot: robot, who: who} | self._labels
-        self._drives[operator, number] = names[robot], names[who]
+        robot, driver = facts[:2]
+        names = {robot: robot, driver: driver} | self._labels
+        self._drives[operator, number] = names[robot], names[driver]
 
     def _drove(
         self, operator: str, number: int, seen: Sequence[Line], made: Sequence[Line]
     ) -> Iterator[ChannelMessage]:
-        robot, who = self._drives.get((operator, number), ("", ""))
-        topic = f"/{who}/{channels.SCREEN}"
+        robot, driver = self._drives.get((operator, number), ("", ""))
+        topic = f"/{driver}/{channels.SCREEN}"
         for captured, when in seen if robot else ():
             yield channels.frame_shown(when, topic, number, robot, captured=captured)
             yield channels.latency(when, robot, "picture", delay=when - captured)

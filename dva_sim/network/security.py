@@ -66,18 +66,18 @@ class Greeting:
         """Take what has arrived, and go on."""
         while not self.done:
             try:
-                who, data = self.socket.recv_multipart(zmq.NOBLOCK)
+                peer, data = self.socket.recv_multipart(zmq.NOBLOCK)
             except zmq.Again:
                 return
             if data:
-                self._hear(who, data)
+                self._hear(peer, data)
             elif self._is_open:  # an empty message tells of an end, too
                 self.done = True
             else:
                 self._is_open = True
-                self._say(who, _SIGNATURE + _VERSION)
+                self._say(peer, _SIGNATURE + _VERSION)
 
-    def _hear(self, who: bytes, data: bytes) -> None:
+    def _hear(self, peer: bytes, data: bytes) -> None:
         if self.theirs is not None:
             return
         self._heard += data
@@ -88,11 +88,11 @@ class Greeting:
             self.done = True
         else:
             rest = self.mechanism.encode().ljust(20, b"\0")
-            self._say(who, rest.ljust(_LENGTH - _MECHANISM.start, b"\0"))
+            self._say(peer, rest.ljust(_LENGTH - _MECHANISM.start, b"\0"))
 
-    def _say(self, who: bytes, data: bytes) -> None:
+    def _say(self, peer: bytes, data: bytes) -> None:
         try:
-            self.socket.send_multipart([who, data], zmq.NOBLOCK)
+            self.socket.send_multipart([peer, data], zmq.NOBLOCK)
         except zmq.ZMQError:  # the other end has gone meanwhile
             self.done = True
 

@@ -299,7 +299,7 @@ def _event(entry: Mapping[str, Any]) -> Event:
         position=Position(entry["latitude_deg"], entry["longitude_deg"]),
         severity=entry["severity"],
         state=State(entry["state"]),
-        **{who: entry[who] for who in writing.SENT},
+        **{role: entry[role] for role in writing.SENT},
         times=dict(entry["times_s"]),
     )
 

@@ -113,8 +113,10 @@ class _Maker:
     def transform(self, name: str, p: TrackPoint) -> Any:
         """Return tf2_msgs/TFMessage with one transform."""
         turn = self._pose(p).orientation
-        there = self._new("geometry_msgs/msg/Transform", self._vector(p.x, p.y), turn)
-        stamped = self._new("geometry_msgs/msg/TransformStamped", self._header(p.time), name, there)
+        transform = self._new("geometry_msgs/msg/Transform", self._vector(p.x, p.y), turn)
+        stamped = self._new(
+            "geometry_msgs/msg/TransformStamped", self._header(p.time), name, transform
+        )
         return self._new("tf2_msgs/msg/TFMessage", [stamped])
 
     def twist(self, time: float, name: str, ahead: float, left: float, turn: float) -> Any:

@@ -363,7 +363,7 @@ def _event(event: Event) -> dict[str, Any]:
         "longitude_deg": event.position.longitude,
         "severity": event.severity,
         "state": event.state.value,
-        **{who: getattr(event, who) for who in SENT},
+        **{role: getattr(event, role) for role in SENT},
         "times_s": event.times,
     }
 

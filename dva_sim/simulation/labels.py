@@ -85,8 +85,10 @@ def _measures() -> dict[str, Measure]:
 
 def stated_conditions(models: Iterable[str]) -> dict[str, str]:
     """Return keys that a table of conditions may state, with their words there, of some models."""
-    there = (titled_keys(MODELS[name].scenario) for name in models if name in MODELS)
-    return {path: key.condition for entry in there for path, key in entry.items() if key.condition}
+    entries = (titled_keys(MODELS[name].scenario) for name in models if name in MODELS)
+    return {
+        path: key.condition for entry in entries for path, key in entry.items() if key.condition
+    }
 
 
 _OWN_COLUMNS: dict[str, Measure] = {}

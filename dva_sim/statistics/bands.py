@@ -46,13 +46,13 @@ _ROUNDING = 1e-12  # spread below this share of the values is rounding, not vari
 
 def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the mean, standard error and count per level `(b, k)` for rows weighted `(b, n)`."""
-    there = np.isfinite(values)
-    filled = np.where(there, values, 0.0)
-    count = weights @ there
+    is_finite = np.isfinite(values)
+    filled = np.where(is_finite, values, 0.0)
+    count = weights @ is_finite
     nobody = count < 1
     few = count < 2
-    centre = filled.sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    off = np.where(there, values - centre, 0.0)  # centred first: squares keep their digits
+    centre = filled.sum(axis=0) / np.maximum(is_finite.sum(axis=0), 1)
+    off = np.where(is_finite, values - centre, 0.0)  # centred first: squares keep their digits
     mean = np.where(nobody, np.nan, (weights @ off) / np.maximum(count, 1))
     square = (weights @ off**2) / np.maximum(count, 1)
     variance = np.where(few, np.nan, (square - mean**2) / np.maximum(count - 1, 1))

@@ -77,9 +77,11 @@ def _beside_persons(pairs: Pairs) -> Floats:
 
 def _size(pairs: Pairs, spread: Floats) -> Floats:
     """Mean differences over a spread that is as if divided by one less; nan without any."""
-    there = spread > 0
-    size = pairs.difference / np.where(there, spread, 1)
-    return np.where(there, size * np.sqrt(np.maximum(pairs.persons - 1, 0) / pairs.persons), np.nan)
+    varies = spread > 0
+    size = pairs.difference / np.where(varies, spread, 1)
+    return np.where(
+        varies, size * np.sqrt(np.maximum(pairs.persons - 1, 0) / pairs.persons), np.nan
+    )
 
 
 def _times(interval: Interval, factor: float) -> Interval:
@@ -204,17 +206,17 @@ def components(values: ArrayLike) -> Components:
         Searle, Casella & McCulloch, Variance Components (1992), chapter 3.
     """
     grid = np.asarray(values, dtype=float)
-    there = np.isfinite(grid)
-    grid = grid[there.any(axis=1)]
-    there = there[there.any(axis=1)]
-    count = there.sum(axis=1)
+    is_finite = np.isfinite(grid)
+    grid = grid[is_finite.any(axis=1)]
+    is_finite = is_finite[is_finite.any(axis=1)]
+    count = is_finite.sum(axis=1)
     persons = len(count)
     runs = int(count.sum())
     if persons < 2 or runs <= persons:
         return Components(math.nan, math.nan)
-    filled = np.where(there, grid, 0.0)
+    filled = np.where(is_finite, grid, 0.0)
     means = filled.sum(axis=1) / count
-    off = np.where(there, grid - means[:, np.newaxis], 0.0)
+    off = np.where(is_finite, grid - means[:, np.newaxis], 0.0)
     within = float((off**2).sum() / (runs - persons))
     grand = filled.sum() / runs
     square_between = float((count * (means - grand) ** 2).sum() / (persons - 1))

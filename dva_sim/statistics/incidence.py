@@ -155,13 +155,13 @@ def cumulative_incidence(
         Biometrika 90 (2003) 15-27 (leaving out units in turn).
     """
     moments = np.asarray(times, dtype=float)
-    there = np.isfinite(moments)
-    what = np.array([str(c) if c is not None else "" for c in causes])[there]
-    moments = moments[there]
-    who = np.asarray(person)[there]
+    is_finite = np.isfinite(moments)
+    what = np.array([str(c) if c is not None else "" for c in causes])[is_finite]
+    moments = moments[is_finite]
+    person_of_row = np.asarray(person)[is_finite]
     what[moments > horizon] = ""
     names = [str(name) for name in np.unique(what) if name]
-    persons, owner = np.unique(who, return_inverse=True)
+    persons, owner = np.unique(person_of_row, return_inverse=True)
     codes = {name: number for number, name in enumerate(names, 1)}
     causes_met = np.array([codes.get(name, CUT) for name in what], dtype=np.intp)
     left_out = [owner != one for one in range(len(persons))]

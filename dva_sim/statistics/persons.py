@@ -49,10 +49,10 @@ def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Fl
         The persons `(m,)`, sorted, and their means `(m,)`; nobody without a value.
     """
     numbers = np.asarray(values, dtype=float)
-    who = np.asarray(person)
-    there = np.isfinite(numbers)
-    persons, code = np.unique(who[there], return_inverse=True)
-    totals = np.bincount(code, weights=numbers[there], minlength=len(persons))
+    person_of_row = np.asarray(person)
+    is_finite = np.isfinite(numbers)
+    persons, code = np.unique(person_of_row[is_finite], return_inverse=True)
+    totals = np.bincount(code, weights=numbers[is_finite], minlength=len(persons))
     return persons, totals / np.bincount(code, minlength=len(persons))
 
 

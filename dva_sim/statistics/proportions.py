@@ -84,10 +84,10 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
 def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.intp], int]:
     """Return numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
     numbers = np.asarray(values, dtype=float)
-    who = np.asarray(person)
-    there = np.isfinite(numbers)
-    persons, code = np.unique(who[there], return_inverse=True)
-    return numbers[there], code, len(persons)
+    person_of_row = np.asarray(person)
+    is_finite = np.isfinite(numbers)
+    persons, code = np.unique(person_of_row[is_finite], return_inverse=True)
+    return numbers[is_finite], code, len(persons)
 
 
 def _variance(flags: Floats, code: NDArray[np.intp]) -> float:

@@ -107,7 +107,7 @@ class RecoveryProbes:
         A robot that its holder kept until then is granted late: its probe takes as long as any.
         """
         begins = self._calm + RECOVERS_WITHIN
-        late = max((self._granted.get(who, begins) for who in self._open), default=begins)
+        late = max((self._granted.get(device, begins) for device in self._open), default=begins)
         return min(late, begins + PROBES_LAST) + PROBES_LAST
 
     def end(self) -> None:

@@ -243,5 +243,5 @@ class RegionalStorm:
             entry = run.dvas[device.dva].core.registry.entries.get(device.id_tag)
             if entry is None or entry.silent:
                 what = f"does not hear {device.label}, which is registered with it"
-                who = run.dvas[device.dva].device.label
-                self.recorder.violated("S8", self.now, who, what)
+                label = run.dvas[device.dva].device.label
+                self.recorder.violated("S8", self.now, label, what)

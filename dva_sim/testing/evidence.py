@@ -58,10 +58,10 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
         lacking = listed((f"{topic} {n}" for topic, n in sorted(opened.left_out.items())), 4)
         problems.append(Problem(1, 1, f"was filtered: messages are missing, by topic: {lacking}"))
     note = f"{len(messages)} messages"
-    for who, lines in opened.traces.items():
+    for robot, lines in opened.traces.items():
         replayed = _replayed([line.encode() for line in lines], path)
-        problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
-        note += f", {replayed.decisions} decisions of {who}"
+        problems += [Problem(1, 1, f"{robot}, line {p.line}: {p.text}") for p in replayed.problems]
+        note += f", {replayed.decisions} decisions of {robot}"
     if opened.audit:
         problem = verify_plain(opened.audit)
         if wrong := problem.problem:

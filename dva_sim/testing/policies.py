@@ -204,9 +204,9 @@ def _ways(
         distance[:] = 100.0
     distance[rng.random(distance.shape) < kind.cut_off] = np.inf
     for_people = np.array([task.stage == "contain" for task in tasks], dtype=bool)
-    robots = np.array([who.kind == "robot" for who in team], dtype=bool)
+    robots = np.array([responder.kind == "robot" for responder in team], dtype=bool)
     distance[np.ix_(for_people, robots)] = np.inf
-    speed, mobilisation = np.array([_PACE[who.kind] for who in team]).reshape(-1, 2).T
+    speed, mobilisation = np.array([_PACE[responder.kind] for responder in team]).reshape(-1, 2).T
     return distance, mobilisation + distance / speed
 
 
@@ -214,7 +214,7 @@ def _cover(team: tuple[Responder, ...], rng: np.random.Generator) -> Cover:
     stations = int(rng.integers(0, 5))
     zones = int(rng.integers(1, 7))
     eta = np.round(rng.uniform(0.0, 300.0, (len(team), stations)))
-    stuck = [who.kind == "robot" or who.engaged is not None for who in team]
+    stuck = [responder.kind == "robot" or responder.engaged is not None for responder in team]
     eta[np.array(stuck, dtype=bool)] = np.inf
     eta[rng.random(eta.shape) < 0.1] = np.inf
     reach = np.round(rng.uniform(20.0, 300.0, (stations, zones)))
@@ -379,14 +379,14 @@ def _forbidden(policy: Policy, situation: Situation, advice: Sequence[Any]) -> I
                     f"task {piece.task} ({task.stage}{due}, auction {task.auction or 'none'}) ",
                 )
             continue
-        who = situation.responders[piece.responder]
-        robots += who.kind == "robot" and who.engaged is None
+        responder = situation.responders[piece.responder]
+        robots += responder.kind == "robot" and responder.engaged is None
         if not np.isfinite(situation.eta[piece.task, piece.responder]):
             pair = f"responder {piece.responder} to task {piece.task} "
             yield "sends somebody who would never arrive", pair
         if task.engaged is not None:
             yield "gives a task that somebody is under way to", f"task {piece.task} "
-        if who.engaged is not None and not policy.preempts:
+        if responder.engaged is not None and not policy.preempts:
             case = f"responder {piece.responder} "
             yield "redirects somebody without `preempts = True`", case
     if robots > situation.operators:

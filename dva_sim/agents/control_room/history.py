@@ -53,10 +53,10 @@ class EventHistory:
             self._add(EventStep(at - seen.ago, "acknowledge", seen.label))
         is_new = status.event_state != ("pending" if before is None else before.event_state)
         if is_new or (before is not None and status.responder != before.responder):
-            there = status.responder or status.actor
-            if there is None and before is not None and status.closed_for is None:
-                there = before.actor if before.event_state == "confirmed" else before.responder
-            self._add(EventStep(at - status.state_for, status.event_state, "", there or ""))
+            responder = status.responder or status.actor
+            if responder is None and before is not None and status.closed_for is None:
+                responder = before.actor if before.event_state == "confirmed" else before.responder
+            self._add(EventStep(at - status.state_for, status.event_state, "", responder or ""))
 
     def hear_record(self, record: m.AuditRecord, at: float) -> None:
         """Take the DVA's record of a decision at a time [s]."""

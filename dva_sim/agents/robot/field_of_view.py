@@ -71,10 +71,10 @@ class FieldOfView:
             if abs(bearing) - half_width > self.angle / 2:
                 continue
             here = (x, y)
-            there = (hazard.x, hazard.y)
-            if not self.line_of_sight(here, there):
+            place = (hazard.x, hazard.y)
+            if not self.line_of_sight(here, place):
                 continue
-            depth = 0.0 if hazard.shines else self.smoke(here, there)
+            depth = 0.0 if hazard.shines else self.smoke(here, place)
             if depth < SEEN_THROUGH:
                 looks = 2.0 * half_width, math.exp(-depth)
                 seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance, *looks))

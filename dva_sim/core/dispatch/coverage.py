@@ -49,8 +49,8 @@ class Coverage(Policy):
         sent = {choice.responder for choice in chosen}
         guards = [
             place
-            for place, who in enumerate(situation.responders)
-            if who.kind == "guard" and who.engaged is None and place not in sent
+            for place, responder in enumerate(situation.responders)
+            if responder.kind == "guard" and responder.engaged is None and place not in sent
             if np.isfinite(situation.cover.eta[place]).any()
         ]
         return [*chosen, *self._moves(situation.cover, guards)]

@@ -44,7 +44,9 @@ class BatchOptimal(Policy):
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         tasks = np.array(waiting(situation), dtype=np.intp)
         team = situation.responders
-        idle = np.array([r for r, who in enumerate(team) if who.engaged is None], dtype=np.intp)
+        idle = np.array(
+            [r for r, responder in enumerate(team) if responder.engaged is None], dtype=np.intp
+        )
         if not tasks.size or not idle.size:
             return []
         robots = np.array([team[r].kind == "robot" for r in idle], dtype=bool)

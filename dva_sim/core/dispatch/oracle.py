@@ -180,7 +180,7 @@ class OraclePolicy(Policy):
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         tasks = {situation.tasks[place].event - 1: place for place in waiting(situation)}
-        places = {who.device: place for place, who in enumerate(situation.responders)}
+        places = {responder.device: place for place, responder in enumerate(situation.responders)}
         free = Free(situation)
         chosen = []
         for device, tour in zip(self.devices, self.plan.tours, strict=True):

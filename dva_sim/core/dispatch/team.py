@@ -82,6 +82,6 @@ class HazardTeam(Policy):
         ]
 
 
-def _only(cost: Floats, who: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Floats:
+def _only(cost: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Floats:
     """Return the cost, infinite for all others."""
-    return np.where(who, cost, np.inf)
+    return np.where(mask, cost, np.inf)

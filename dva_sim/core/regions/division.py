@@ -88,8 +88,8 @@ class Division:
     def deputy_of(self, region: str, registry: Registry) -> str | None:
         """Return the first in the line that is there and does not serve it; None if nobody is."""
         serves = self.claims[region].dva
-        there = (d for d in self.lines[region] if d != serves and self.is_there(d, registry))
-        return next(there, None)
+        candidates = (d for d in self.lines[region] if d != serves and self.is_there(d, registry))
+        return next(candidates, None)
 
     def is_there(self, dva: str, registry: Registry) -> bool:
         """Return True for this DVA, and for others that are heard."""

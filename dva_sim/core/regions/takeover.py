@@ -167,11 +167,11 @@ class Deputy:
             copies = self.copies.get(region, {})
             for number, copy in list(copies.items()):
                 sent = self._sent(copy.status)
-                there = all(self._is_there(device) for device in sent)
-                there = there and copy.status.responder not in self.orders.engaged
-                if there or now - since >= COME_WITHIN:
+                are_back = all(self._is_there(device) for device in sent)
+                are_back = are_back and copy.status.responder not in self.orders.engaged
+                if are_back or now - since >= COME_WITHIN:
                     del copies[number]
-                    self._go_on(copy, there, now)
+                    self._go_on(copy, are_back, now)
 
     @staticmethod
     def _sent(status: m.EventStatus) -> list[str]:
@@ -182,13 +182,13 @@ class Deputy:
         entry = self.orders.registry.entries.get(device)
         return entry is not None and not entry.silent
 
-    def _go_on(self, copy: Copy, there: bool, now: float) -> None:
+    def _go_on(self, copy: Copy, are_back: bool, now: float) -> None:
         status = copy.status
         events = self.orders.events
         if events.get(status.event_id) is not None or self._is_looked_at(status):
             return
         state = State(status.event_state.replace("_", " "))
-        if not there and state in LOOKING:
+        if not are_back and state in LOOKING:
             state = State.PENDING
         event = Event(
             status.event_id,
@@ -206,7 +206,7 @@ class Deputy:
         if state is not State.PENDING:
             steps = {State.CONFIRMED: ["confirmed"], State.ON_SCENE: ["assigned", "arrived"]}
             event.times |= dict.fromkeys(steps.get(state, ["assigned"]), began)
-        if there:
+        if are_back:
             self._keep_at_it(event, status, began)
         events.total += 1
         events.first -= 1  # the next one that is new here is numbered as before

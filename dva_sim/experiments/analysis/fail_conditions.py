@@ -301,10 +301,10 @@ def _both(gate: Gate, first: Rows, second: Rows) -> tuple[Rows, Rows]:
     alone = gate.statistic == "share" or gate.bound.kind == "absolute"
     if alone or first.runs != second.runs:
         return first, second
-    there = np.isfinite(first.values) & np.isfinite(second.values)
-    if not there.any():
+    in_both = np.isfinite(first.values) & np.isfinite(second.values)
+    if not in_both.any():
         return first, second
-    return first.where(there), second.where(there)
+    return first.where(in_both), second.where(in_both)
 
 
 def _tested(gate: Gate, rows: Rows, column: str) -> Rows:

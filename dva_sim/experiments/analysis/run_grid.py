@@ -181,9 +181,9 @@ def person_means(values: Floats) -> Floats:
 
 def nan_mean(values: Floats, axis: int) -> Floats:
     """Return the mean of what is there; nan, in silence, where nothing is."""
-    there = np.isfinite(values)
-    count = there.sum(axis=axis)
-    total = np.where(there, values, 0.0).sum(axis=axis)
+    is_finite = np.isfinite(values)
+    count = is_finite.sum(axis=axis)
+    total = np.where(is_finite, values, 0.0).sum(axis=axis)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 

@@ -162,8 +162,8 @@ def adjusted_means(sides: Sequence[Floats], covariates: Sequence[Sequence[Floats
     """
     differences = sides[0] - sides[1]
     means = person_means(differences)
-    there = np.isfinite(differences)
-    beside = [person_means(np.where(there, (a + b) / 2, np.nan)) for a, b in covariates]
+    is_finite = np.isfinite(differences)
+    beside = [person_means(np.where(is_finite, (a + b) / 2, np.nan)) for a, b in covariates]
     return adjusted(means, beside) if beside else means
 
 

@@ -286,8 +286,8 @@ def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
     every = runs_in(manifest)
     done = checkpoint.done()
     failed = checkpoint.failures()
-    there = set(done | failed.keys())
-    unfinished = {run.person for run in every if run.key not in there}
+    run_keys = set(done | failed.keys())
+    unfinished = {run.person for run in every if run.key not in run_keys}
     whole = [run for run in every if run.person not in unfinished]
     keys = {run.key for run in every}
     if not any(run.key in done for run in whole):

@@ -210,5 +210,5 @@ def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
 
 def _print_of(row: Row) -> str:
     """Hash a row, the same for the row of a run and for that of a table."""
-    there = {name: v for name, v in row.items() if v is not None and v == v}
-    return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
+    filled = {name: v for name, v in row.items() if v is not None and v == v}
+    return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in filled.items()})

@@ -90,14 +90,14 @@ def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str
     others = view.panels[1:] if finding.within and stop is not None else []
     differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in others]
     apart = [entry for entry in differences if np.isfinite(entry[1])]
-    there = place(finding, [stop or 0])
+    where = place(finding, [stop or 0])
     varied = {key.name for key in keys_of(reading.study)}
     scenario = reading.scenario_of(finding.part)
     values = {key: get(scenario, key) for key in reading.page.assumed if key not in varied}
     return sentence(
         "settings",
         within=setting(finding.within) if others else "",
-        there=there and f" {there}",
+        there=where and f" {where}",
         levels=other_levels(finding, len(apart)) if apart else "",
         means=[mean for _, mean, _, _ in apart],
         unit=finding.unit,

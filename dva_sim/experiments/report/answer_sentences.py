@@ -144,10 +144,10 @@ def _dependence(f: Finding, is_led: bool) -> str:
 
 def _without_band(f: Finding) -> str:
     """Return the plain mean of these runs, without a band and without a claim beyond them."""
-    there = np.flatnonzero(np.isfinite(f.mean))
-    if not len(there):
+    stops = np.flatnonzero(np.isfinite(f.mean))
+    if not len(stops):
         return sentence("no_pair")
-    stop = int(there[-1])
+    stop = int(stops[-1])
     return sentence("without_band", **_facts(f, stop), mean=float(f.mean[stop]))
 
 
@@ -237,8 +237,8 @@ def telling_stop(finding: Finding) -> int | None:
     """Return the stop the answer leads with, else the last one that has a band."""
     if finding.differs.any():
         return _telling_level(finding, np.flatnonzero(finding.differs))
-    there = np.flatnonzero(np.isfinite(finding.low))
-    return int(there[-1]) if len(there) else None
+    stops = np.flatnonzero(np.isfinite(finding.low))
+    return int(stops[-1]) if len(stops) else None
 
 
 def place(f: Finding, where: Sequence[int] | NDArray[np.intp]) -> str:

@@ -97,20 +97,20 @@ def cell_table(
         if column != measure and part.has(column)
     ]
     columns.append(_beyond(support))
-    there = [c for c in columns if c is not None]
+    filled = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
         [
             *(level_name(factor, level) for factor, level in setting.items()),
-            *(values[i] for _, values in there),
+            *(values[i] for _, values in filled),
         ]
         for i, setting in enumerate(settings)
     ]
-    ran = [bool(there) for there in part.ran.ravel()]
+    ran = [bool(filled) for filled in part.ran.ravel()]
     if is_listed:
-        rows = [row for row, there in zip(rows, ran, strict=True) if there]
+        rows = [row for row, filled in zip(rows, ran, strict=True) if filled]
     empty = 0 if is_listed else ran.count(False)
-    heads = [*names, *(head for head, _ in there)]
+    heads = [*names, *(head for head, _ in filled)]
     whole = CellTable(part.name, heads, len(names) + len(points), rows, empty)
     same = [f"{whole.heads[n]} {whole.rows[0][n]}" for n in _constant(whole)]
     notes = f"The same in all configurations: {', '.join(same)}." if same else ""

@@ -178,15 +178,15 @@ class EventOutcomes(NamedTuple):
         return sentence(
             "events",
             e=self,
-            missed=[_looked(*who, n) for who, n in self.missed.most_common()],
+            missed=[_looked(*key, n) for key, n in self.missed.most_common()],
             left=[(_LEFT.get(outcome, outcome), n) for outcome, n in self.left.most_common()],
         )
 
 
-def _looked(kind: str, who: str, number: int) -> str:
+def _looked(kind: str, responder: str, number: int) -> str:
     if number == 1:
-        return f"1 {kind.replace('_', ' ')} inspected by a {who}"
-    return f"{number} {kind.replace('_', ' ')}s inspected by {who}s"
+        return f"1 {kind.replace('_', ' ')} inspected by a {responder}"
+    return f"{number} {kind.replace('_', ' ')}s inspected by {responder}s"
 
 
 def outcomes_of(events: Mapping[str, NDArray[Any]]) -> EventOutcomes | None:

@@ -100,7 +100,7 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
     path: tuple[str, ...] = ()
     while key:
         kind = _bare(kind)
-        there = data if isinstance(data, dict) else {}
+        mapping = data if isinstance(data, dict) else {}
         if isinstance(kind, type(BaseModel)):
             step = key.partition(".")[0]
             field = kind.model_fields.get(step)
@@ -108,12 +108,12 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
         elif get_origin(kind) is dict:
             kind = _bare(get_args(kind)[1])
             has_keys = get_origin(kind) is dict or isinstance(kind, type(BaseModel))
-            step = _entry(there, key) if has_keys else key
+            step = _entry(mapping, key) if has_keys else key
         else:
             raise ConfigError(f"{'.'.join(path)!r} has no keys, so no {key!r}")
         path = (*path, step)
         key = key[len(step) + 1 :]
-        data = there.get(step)
+        data = mapping.get(step)
     return path
 
 
@@ -124,15 +124,15 @@ def _bare(kind: Any) -> Any:
     return kind
 
 
-def _entry(there: Mapping[str, Any], key: str) -> str:
+def _entry(mapping: Mapping[str, Any], key: str) -> str:
     """Return the name in a mapping that a dotted key begins with.
 
     The whole key may be a new name.
     """
-    names = [name for name in there if key == name or key.startswith(f"{name}.")]
+    names = [name for name in mapping if key == name or key.startswith(f"{name}.")]
     if not names and "." in key:
         first = key.partition(".")[0]
-        raise ConfigError(f"no {first!r} in the study to change; {hint(first, there, 'there')}")
+        raise ConfigError(f"no {first!r} in the study to change; {hint(first, mapping, 'there')}")
     return max(names, key=len, default=key)
 
 

@@ -62,9 +62,9 @@ class CrossedLink:
 
     def _started(self, end: str) -> Child:
         words = [sys.executable, "-P", "-m", __name__, self._folder.name, end]
-        self._controls[end], there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with there:
-            return self._link.start(end, words, f"the relay at the {end} end", stdin=there)
+        self._controls[end], far_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with far_socket:
+            return self._link.start(end, words, f"the relay at the {end} end", stdin=far_socket)
 
     def begin(self) -> None:
         """Let the link's time begin now: the moment that outages and recordings count from."""
@@ -143,9 +143,9 @@ class _Relay:
     async def _lead(self, number: int, listener: int) -> asyncio.Server:
         async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             with suppress(*publishing.BROKEN):
-                there = await self._across()
-                there[1].write(number.to_bytes(_NUMBER, "big"))
-                await self._join((reader, writer), there)
+                across = await self._across()
+                across[1].write(number.to_bytes(_NUMBER, "big"))
+                await self._join((reader, writer), across)
             writer.close()
 
         listening = socket.socket(fileno=listener)
@@ -165,8 +165,8 @@ class _Relay:
         with suppress(*publishing.BROKEN):
             number = int.from_bytes(await reader.readexactly(_NUMBER), "big")
             place = _place(self._folder, number)
-            there = await asyncio.open_unix_connection(place, limit=_BUFFER)
-            await self._join((reader, writer), there)
+            streams = await asyncio.open_unix_connection(place, limit=_BUFFER)
+            await self._join((reader, writer), streams)
         writer.close()
 
     @staticmethod

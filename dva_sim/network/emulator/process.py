@@ -62,17 +62,17 @@ class LinkProcess:
     def __init__(self, config: LinkConfig, seed: int, rootless: bool = False) -> None:
         if sys.platform != "linux":
             raise EmulatorError(f"the emulated link {NEEDS}; this is {sys.platform}")
-        self._channel, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._channel, far_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._channel.settimeout(_PATIENCE_S)
         self._spaces: list[int] = []
-        numbers = [str(os.getpid()), str(there.fileno())]
-        with there:
+        numbers = [str(os.getpid()), str(far_socket.fileno())]
+        with far_socket:
             self._process = Child(
                 "the emulated link",
                 # -P: a file of the user that is called like a module of Python is not imported.
                 [sys.executable, "-P", "-m", "dva_sim.network.emulator.start", *numbers],
                 self._channel.close,
-                pass_fds=(there.fileno(),),
+                pass_fds=(far_socket.fileno(),),
             )
         try:
             job = {"link": config.model_dump(mode="json"), "seed": seed, "rootless": rootless}

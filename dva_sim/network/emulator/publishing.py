@@ -47,8 +47,8 @@ class _Leader:
         with suppress(*BROKEN):
             for host in _HOSTS:
                 with suppress(ConnectionRefusedError):
-                    there = await asyncio.open_connection(host, self._port)
-                    await join((reader, writer), there)
+                    streams = await asyncio.open_connection(host, self._port)
+                    await join((reader, writer), streams)
                     break
         writer.close()
 

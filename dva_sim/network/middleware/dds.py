@@ -111,11 +111,11 @@ class _DdsEnd(TransportEnd):
 
 def _configuration(place: Rendezvous, is_near: bool) -> str:
     """Return the configuration of Cyclone DDS: this address, the peer by name, no multicast."""
-    here, there = (place.near, place.far)[:: 1 if is_near else -1]
+    own, peer = (place.near, place.far)[:: 1 if is_near else -1]
     return (
         "<CycloneDDS><Domain id='any'><General><Interfaces>"
-        f"<NetworkInterface address='{escape(here)}' multicast='false'/></Interfaces>"
+        f"<NetworkInterface address='{escape(own)}' multicast='false'/></Interfaces>"
         "<AllowMulticast>false</AllowMulticast></General>"
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-        f"<Peers><Peer Address='{escape(there)}'/></Peers></Discovery></Domain></CycloneDDS>"
+        f"<Peers><Peer Address='{escape(peer)}'/></Peers></Discovery></Domain></CycloneDDS>"
     )

@@ -288,7 +288,7 @@ class EventLedger:
         An operator who has been sent again with another robot may still report for the first.
         """
         event = self._events.get(number)
-        went = [goes for who, goes in word.went if who == source]
+        went = [goes for reporter, goes in word.went if reporter == source]
         if not went or event is None:
             return
         self._takes_up(number, source)
@@ -444,7 +444,7 @@ class EventLedger:
         sent = {event.operator: event.responder, event.responder: event.responder}
         sent[event.actor] = event.actor
         self._promised[event.number] = 0.0
-        word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
+        word.ordered.update((device, goes or device) for device, goes in sent.items() if device)
         word.went.update(word.ordered.items())
         conclusions = FOUND.intersection((*event.times, event.state.value))
         return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))
@@ -568,12 +568,15 @@ class EventLedger:
     def _of_arrivals(self, event: Event, old: Seen | None) -> Iterator[Broken]:
         """Yield a device that is noted as arrived, and has not been near the event."""
         reached = self._word(event.number).reached
-        for step, who in ("arrived", event.responder), ("act_arrived", event.actor):
+        for step, device in ("arrived", event.responder), ("act_arrived", event.actor):
             when = event.times.get(step)
-            if who is None or when is None or (old is not None and when == old.times.get(step)):
+            if device is None or when is None or (old is not None and when == old.times.get(step)):
                 continue
-            if who not in reached and not self._is_near(who, event):
-                yield "S7", f"event {event.number}: {self._name(who)} has arrived, and is not there"
+            if device not in reached and not self._is_near(device, event):
+                yield (
+                    "S7",
+                    f"event {event.number}: {self._name(device)} has arrived, and is not there",
+                )
 
     def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
         """Yield somebody who has not set out, or does not move, and still has the order."""
@@ -622,20 +625,22 @@ class EventLedger:
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
         """Return what devices with an event owe; with several orders, they may begin with any."""
         word = self._word(event.number)
-        who = hands[1] if hands else None
-        if who is None or who not in word.taken or self._has_others(who, event.number):
+        device = hands[1] if hands else None
+        if device is None or device not in word.taken or self._has_others(device, event.number):
             return Debt(None, False, now)
         if ("act_arrived" if hands[0] == "act" else "arrived") in event.times:
             return Debt(None, False, now)
-        goes = hands[-1] or who
+        goes = hands[-1] or device
         step = ("act_departed" if hands[0] == "act" else "departed") in event.times
         place = self._place_of(goes)
-        is_same = (old.who, old.step) == (who, step) and not word.sent_again
+        is_same = (old.who, old.step) == (device, step) and not word.sent_again
         moved = step and (None in (place, old.place) or _far(place, old.place))
-        return old if is_same and not moved else Debt(who, step, now, place)
+        return old if is_same and not moved else Debt(device, step, now, place)
 
-    def _has_others(self, who: str, number: int) -> bool:
-        others = (n for n, word in self._words.items() if who in word.ordered.keys() - word.ended)
+    def _has_others(self, device: str, number: int) -> bool:
+        others = (
+            n for n, word in self._words.items() if device in word.ordered.keys() - word.ended
+        )
         return any(other != number for other in others)
 
     def _is_found(self, event: Event, finding: str, now: float) -> bool:

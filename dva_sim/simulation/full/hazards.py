@@ -200,8 +200,8 @@ class RunHazards:
         now = self.stage.clock.now
         for number, incident in enumerate(self.incidents):
             near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE
-            there = incident.is_there(now) and number not in self.contained
-            if incident.kind == kind and near and there:
+            is_active = incident.is_there(now) and number not in self.contained
+            if incident.kind == kind and near and is_active:
                 self.contained[number] = now
                 self.surroundings.contain([*self._real].index(number), now)
 

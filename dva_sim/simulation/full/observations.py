@@ -492,7 +492,7 @@ def event_facts(event: Event, where: str) -> dict[str, Any]:
         "state": event.state.value,
         "where": where,
         "contain": event.needs_containment,
-        **{who: getattr(event, who) for who in _SENT},
+        **{role: getattr(event, role) for role in _SENT},
         "times_s": dict(event.times),
     }
 
@@ -581,7 +581,7 @@ class EventTableCopy:
             State(facts["state"]),
             waiting_since=math.nan,
             times=dict(facts["times_s"]),
-            **{who: facts[who] for who in _SENT},
+            **{role: facts[role] for role in _SENT},
         )
         for where, events in ((_OPEN, self.events.open), (_CLOSED, self.events.closed)):
             if facts["where"] in (where, _BOTH_KINDS):

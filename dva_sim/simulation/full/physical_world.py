@@ -107,10 +107,10 @@ class Field(RunHazards):
             pose = robot.body.pose()
             mode = robot.controller.mode.value
             yield robot.device.label, TrackPoint(now, pose.x, pose.y, pose.heading, mode)
-        for name, who in self.people():
-            x, y = who.walking.place
-            if who.activity != SAFE:
-                yield name, TrackPoint(now, x, y, who.heading, who.activity)
+        for name, agent in self.people():
+            x, y = agent.walking.place
+            if agent.activity != SAFE:
+                yield name, TrackPoint(now, x, y, agent.heading, agent.activity)
 
     # --- what happens ------------------------------------------------------------------
 

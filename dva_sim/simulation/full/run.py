@@ -329,15 +329,15 @@ class Run:
 
     def _people(self) -> list[PersonLog]:
         logs = []
-        for name, who in self.field.people():
+        for name, agent in self.field.people():
             kind = "guard"
             left = (math.inf, math.inf)
-            if isinstance(who, BystanderAgent):
+            if isinstance(agent, BystanderAgent):
                 kind = "bystander"
-                left = (who.leaves_at, who.out_at)
-            dose = who.dose.heat, who.dose.toxic
+                left = (agent.leaves_at, agent.out_at)
+            dose = agent.dose.heat, agent.dose.toxic
             exposure = self.recorder.exposure[name]
-            logs.append(PersonLog(name, kind, who.activity, exposure, *dose, *left))
+            logs.append(PersonLog(name, kind, agent.activity, exposure, *dose, *left))
         return logs
 
     def _settled(self) -> bool:
@@ -514,11 +514,11 @@ class Run:
         now = self.clock.now
         self.field.world.advance_to(now)
         dangers = self.field.dangers(now)
-        for name, who in self.field.people():
-            if who.activity == SAFE:
+        for name, agent in self.field.people():
+            if agent.activity == SAFE:
                 continue
-            x, y = who.walking.place
-            if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
+            x, y = agent.walking.place
+            if is_dangerous(agent.exposure.conditions) or self.field.is_near(dangers, x, y):
                 self.recorder.exposure[name] += WATCH_PERIOD
         if self._log is not None:
             self._log.places(now, self.field.places())

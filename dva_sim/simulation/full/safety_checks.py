@@ -796,8 +796,11 @@ class SafetyAudit:
             return
         witness.does = None  # whatever it obeys now needs a new order
         if motion.mode == Mode.TELEOPERATION and motion.powered:
-            who = self._name_of(does.source)
-            yield "S2", f"is still driven by {who}, who has sent nothing valid for {silent:.0f} s"
+            driver = self._name_of(does.source)
+            yield (
+                "S2",
+                f"is still driven by {driver}, who has sent nothing valid for {silent:.0f} s",
+            )
 
     def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
         """Treat a request that a robot has not answered in time as obeyed by then."""
@@ -818,10 +821,10 @@ class SafetyAudit:
             elif isinstance(body, m.PermissionRevocation):
                 _end(witness, body.session, by)
 
-    def _report(self, found: Iterator[Broken] | list[Broken], now: float, who: str) -> None:
+    def _report(self, found: Iterator[Broken] | list[Broken], now: float, device: str) -> None:
         for rule, what in found:
             named = _ID.sub(lambda found: self._name_of(found[0]), what)
-            self._recorder.violated(rule, now, self._name_of(who), named)
+            self._recorder.violated(rule, now, self._name_of(device), named)
 
 
 def offset_of(picture: Any) -> float | None:

@@ -195,11 +195,11 @@ def measures_of(scenario: Scenario) -> tuple[str, ...]:
     """Return the measures that a run of a scenario may hold: without robots nobody drives one."""
     bystanders = scenario.bystander.count
     guards = scenario.guard.count
-    there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
-    there[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
-    there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
-    there[decisions.RUN_COLUMNS] = scenario.dispatch.person is not None
-    gone = {column for columns, count in there.items() if not count for column in columns}
+    has_rows = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
+    has_rows[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
+    has_rows |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
+    has_rows[decisions.RUN_COLUMNS] = scenario.dispatch.person is not None
+    gone = {column for columns, count in has_rows.items() if not count for column in columns}
     return names_of(column for column in RUN_COLUMNS if column not in gone)
 
 

@@ -278,10 +278,10 @@ def judgement(recording: Recording, log: DriveLog) -> str:
     """`missed`: refuted though it was there. `false`: confirmed though nothing was. Else empty."""
     if log.ended is None or log.outcome not in ("confirmed", "refuted"):
         return ""
-    there = was_there(recording, log.event, log.ended)
+    is_real = was_there(recording, log.event, log.ended)
     if log.outcome == "refuted":
-        return "missed" if there else ""
-    return "" if there else "false"
+        return "missed" if is_real else ""
+    return "" if is_real else "false"
 
 
 # --- rows --------------------------------------------------------------------------------------

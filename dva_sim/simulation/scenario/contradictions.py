@@ -182,11 +182,11 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
     robots = {f"robot-{number}" for number in range(1, scenario.robot.count + 1)}
     holders = {f"operator-{number}" for number in range(1, scenario.operator.count + 1)} | {"dva"}
     for number, rule in enumerate(scenario.access):
-        for kind, named, there in (
+        for kind, named, labels_there in (
             ("robots", rule.robots, robots),
             ("holders", rule.holders, holders),
         ):
-            for label in (label for label in named if label not in there):
+            for label in (label for label in named if label not in labels_there):
                 yield f"access.{number}.{kind} names {label!r}, who is not in this scenario"
     if scenario.transport != "zeromq" and scenario.zeromq.model_fields_set:
         keys = ", ".join(f"{_OF_SOCKETS}.{key}" for key in sorted(scenario.zeromq.model_fields_set))
@@ -216,10 +216,10 @@ def _of_time(scenario: Scenario) -> Iterator[str]:
 def _of_detectors(scenario: Scenario) -> Iterator[str]:
     """Yield events that nobody reports and no detector of the site can notice."""
     unreported = [(n, event) for n, event in enumerate(scenario.events) if not event.reported]
-    there = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
+    detector_kinds = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
     for number, event in unreported:
         kind = find_hazard(event.kind)
-        if there.isdisjoint(kind.detectors):
+        if detector_kinds.isdisjoint(kind.detectors):
             yield (
                 f"events.{number}.reported is false, and the site has no detector for a "
                 f"{kind.title}: the DVA will not hear of it"

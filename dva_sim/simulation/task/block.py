@@ -211,7 +211,7 @@ def _play(
 ) -> Iterator[tuple[Row, Trace]]:
     seat = seat_of(scenario)
     operator = scenario.operator
-    who = seat.person
+    person = seat.person
     conditions = list(scenario.task.conditions())
     plan = [(conditions[0], -1)] * scenario.practice
     plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
@@ -219,8 +219,8 @@ def _play(
         counted = number - scenario.practice
         streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
         alertness = float(streams.fresh("reaction").normal())
-        seat.person = in_a_moment(practised(who, number), alertness, scenario.task)
-        seat.timing = Timing(who.habits.aiming, streams.fresh("timing"))
+        seat.person = in_a_moment(practised(person, number), alertness, scenario.task)
+        seat.timing = Timing(person.habits.aiming, streams.fresh("timing"))
         trial = _trial(scenario, seat, condition, number, streams)
         if recording is not None and isinstance(trial, DriveTrial):
             trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))

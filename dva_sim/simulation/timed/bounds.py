@@ -103,10 +103,10 @@ def share_of_the_way(floor: Floats, reached: Floats, bound: Floats) -> Band:
         its variance.
     """
     floor, bound = (np.broadcast_to(np.atleast_2d(x.T).T, reached.shape) for x in (floor, bound))
-    there = np.isfinite(floor) & np.isfinite(reached) & np.isfinite(bound)
-    gained = np.where(there, floor - reached, np.nan)
-    whole = np.where(there, floor - bound, np.nan)
-    count = np.maximum(there.sum(axis=0), 1)
+    is_finite = np.isfinite(floor) & np.isfinite(reached) & np.isfinite(bound)
+    gained = np.where(is_finite, floor - reached, np.nan)
+    whole = np.where(is_finite, floor - bound, np.nan)
+    count = np.maximum(is_finite.sum(axis=0), 1)
     mean_gained, mean_whole = (np.nansum(x, axis=0) / count for x in (gained, whole))
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(mean_whole > 0, mean_gained / mean_whole, np.nan)

@@ -45,7 +45,7 @@ def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
             for i in incidents
         ]
     )
-    there = np.array(
+    on_scene = np.array(
         [
             [
                 shift.look(u, i) + shift.terrain.length(i.place, u.base) / u.speed
@@ -54,7 +54,7 @@ def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
             for i in incidents
         ]
     )
-    return Instance(np.array([i.noticed for i in incidents]), arrival, arrival + there)
+    return Instance(np.array([i.noticed for i in incidents]), arrival, arrival + on_scene)
 
 
 def _foresee(scenario: TimedScenario, seed: int) -> tuple[Shift, list[Incident]]:

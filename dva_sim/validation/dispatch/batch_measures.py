@@ -130,10 +130,10 @@ def sample_of(recording: TimedRecording) -> Sample:
     order = np.argsort(columns["detected"], kind="stable")
     order = order[np.isfinite(columns["detected"][order])]
     row = {name: np.asarray(columns[name][order], dtype=float) for name in _MOMENTS}
-    who = {name: np.asarray(columns[name][order], dtype=np.int64) for name in _PLACES}
-    outcome = np.array(OUTCOMES)[who["outcome"]]
+    places = {name: np.asarray(columns[name][order], dtype=np.int64) for name in _PLACES}
+    outcome = np.array(OUTCOMES)[places["outcome"]]
     closed = np.isin(outcome, ("confirmed", "contained", "refuted", "escalated", "expired"))
-    unit, busy_from, busy_until = _busy_times(scenario, row, who)
+    unit, busy_from, busy_until = _busy_times(scenario, row, places)
     return Sample(
         streams=tuple(recording.streams),
         units=tuple(recording.responders),
@@ -143,8 +143,8 @@ def sample_of(recording: TimedRecording) -> Sample:
         sources=sum(s.sources.count for s in scenario.demand if s.sources),
         begins=scenario.warm_up_s,
         ends=scenario.horizon_s,
-        stream=who["stream"],
-        unit=who["responder"],
+        stream=places["stream"],
+        unit=places["responder"],
         outcome=np.where(closed, outcome, "open"),
         detected=row["detected"],
         assigned=row["assigned"],
@@ -166,15 +166,15 @@ def sample_of(recording: TimedRecording) -> Sample:
 
 
 def _busy_times(
-    scenario: TimedScenario, row: dict[str, Floats], who: dict[str, Ints]
+    scenario: TimedScenario, row: dict[str, Floats], places: dict[str, Ints]
 ) -> tuple[Ints, Floats, Floats]:
     """Return the units' busy times: looking, with the way back, and acting."""
     returns = np.array([g.after == "return" for g in scenario.responders for _ in range(g.count)])
-    looked = who["responder"] != NOBODY
-    acted = who["actor"] != NOBODY
+    looked = places["responder"] != NOBODY
+    acted = places["actor"] != NOBODY
     ended = np.where(np.isfinite(row["confirmed"]), row["confirmed"], row["closed"])
-    back = np.where(returns[who["responder"]], row["arrived"] - row["departed"], 0.0)
-    unit = np.concatenate([who["responder"][looked], who["actor"][acted]])
+    back = np.where(returns[places["responder"]], row["arrived"] - row["departed"], 0.0)
+    unit = np.concatenate([places["responder"][looked], places["actor"][acted]])
     busy_from = np.concatenate([row["assigned"][looked], row["act_assigned"][acted]])
     busy_until = np.concatenate([(ended + back)[looked], row["contained"][acted]])
     return unit, busy_from, busy_until

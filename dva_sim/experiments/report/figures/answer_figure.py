@@ -140,8 +140,8 @@ def _values(ax: Axes, f: Finding) -> None:
     """Write each mean in figures, beside its mark."""
     if len(f.mean) > _MAX_LABELS:
         return
-    there = present(f.mean)
-    rises = bool(f.over) and there[-1] > there[0]  # then the line is in the way on the right
+    means = present(f.mean)
+    rises = bool(f.over) and means[-1] > means[0]  # then the line is in the way on the right
     for x, (mean, differs) in enumerate(zip(f.mean, f.differs, strict=True)):
         if np.isfinite(mean):
             sign = "+" if mean > 0 and number(mean) != "0" else ""

@@ -98,16 +98,16 @@ class Brought(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        there = [each for each in SHOWN if view.part.has(each.column)]
-        if not there:
+        measures = [each for each in SHOWN if view.part.has(each.column)]
+        if not measures:
             return None
-        figure, _, axes = style.places(len(there), 2, 2.3)
-        for ax, each in zip(axes, there, strict=True):
+        figure, _, axes = style.places(len(measures), 2, 2.3)
+        for ax, each in zip(axes, measures, strict=True):
             _panel(ax, view, each)
-        for ax in axes[: len(there) - 2]:
+        for ax in axes[: len(measures) - 2]:
             ax.set_xlabel("")
         legend(figure, view.line)
-        return self.finish(figure, caption("brought"), _numbers(view, there))
+        return self.finish(figure, caption("brought"), _numbers(view, measures))
 
 
 def _numbers(view: StudyView, measures: Sequence[ShownMeasure]) -> Numbers:
@@ -146,8 +146,8 @@ def _panel(ax: Axes, view: StudyView, measure: ShownMeasure) -> None:
 def _middle(values: Floats) -> Floats:
     """Return ends of the middle 90 % of persons at each stop: `(2, stops)`."""
     ends = np.full((2, values.shape[1]), np.nan)
-    there = np.isfinite(values).any(axis=0)
-    ends[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
+    has_values = np.isfinite(values).any(axis=0)
+    ends[:, has_values] = np.nanpercentile(values[:, has_values], [5, 95], axis=0)
     return ends
 
 

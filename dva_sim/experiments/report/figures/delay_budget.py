@@ -100,8 +100,8 @@ def _driven(view: StudyView, grid: Floats) -> StudyView:
     if view.line is None:
         return view
     name = view.line.name
-    there = [v for v in view.lines if np.isfinite(view.part.where(grid, {name: v})).any()]
-    return replace(view, line=Factor(name, tuple(there)))
+    levels = [v for v in view.lines if np.isfinite(view.part.where(grid, {name: v})).any()]
+    return replace(view, line=Factor(name, tuple(levels)))
 
 
 def _means(view: StudyView, grid: Floats, panel: Setting, level: Level) -> Floats:

@@ -75,13 +75,13 @@ class Distributions(style.ReportFigure):
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the runs of a cell that gave a value, with who drove and whether it was confirmed."""
     part = view.part
-    there = np.isfinite(values)
+    is_finite = np.isfinite(values)
     columns = {
-        "person": part.person[there],
-        "trial": np.tile(part.trials, len(part.persons))[there],
-        view.measure: values[there],
+        "person": part.person[is_finite],
+        "trial": np.tile(part.trials, len(part.persons))[is_finite],
+        view.measure: values[is_finite],
     }
-    return columns | ({"confirmed": ok[there]} if part.has("confirmed") else {})
+    return columns | ({"confirmed": ok[is_finite]} if part.has("confirmed") else {})
 
 
 def _dots(

@@ -48,13 +48,13 @@ class Differences(style.ReportFigure):
         """Draw it."""
         if view.contrast is None or view.line is None:
             return None
-        there = cadences(view, reading.scenario_of(view.part.name))
+        findings = cadences(view, reading.scenario_of(view.part.name))
         baseline = view.contrast[1]
         others = tuple(level for level in view.lines if level != baseline)
         name = level_name(view.line.name, baseline)
         label = style.axis_label(view.measure, f"Difference against\n{name}")
         figure, axes, ends, bars, cut, numbers = _curves(view, others, baseline, label)
-        for ax, finding in zip(axes, there, strict=True):
+        for ax, finding in zip(axes, findings, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, finding)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
@@ -67,7 +67,7 @@ class Differences(style.ReportFigure):
             baseline=name,
             zoomed=zoomed,
             is_marked=view.smallest_effect is not None,
-            has_boundary=any(boundary(view.over, finding) is not None for finding in there),
+            has_boundary=any(boundary(view.over, finding) is not None for finding in findings),
         )
         reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
         return self.finish(figure, words, numbers, title=title, reads=reads)

@@ -119,10 +119,10 @@ def _in_axes(axes: Axes, ends: Ends) -> Ends:
     edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
     bottom = float(edges[0, 1])
     top = float(edges[1, 1])
-    there = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
+    by_height = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
     return {
         level: (float(axes.transData.transform((0.0, end))[1]) - bottom) / (top - bottom)
-        for level, end in there
+        for level, end in by_height
     }
 
 

@@ -140,9 +140,9 @@ def _what(view: StudyView, clouds: list[Cloud]) -> str:
 
 def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
     """Draw points, and the means of as many equal parts of them as there are enough for."""
-    there = np.isfinite(x) & np.isfinite(y)
-    x = x[there]
-    y = y[there]
+    is_finite = np.isfinite(x) & np.isfinite(y)
+    x = x[is_finite]
+    y = y[is_finite]
     few: dict[str, Any] = {"s": 12 if len(x) < 200 else 5, "rasterized": len(x) > 500}
     ax.scatter(x, y, marker=look.mark, color=look.colour, alpha=0.35, lw=0, zorder=2, **few)
     middle, mean, half = trend(x, y)
