@@ -61,17 +61,22 @@ def in_words(report: LinkReport, names: Sequence[str] = tuple(_WAYS)) -> list[st
         names: Words for the way from the near end to the far one, and back.
     """
     ways = zip(names, _WAYS.values(), strict=True)
-    lines = [f"{name}: {_packets(getattr(report, way))}" for name, way in ways]
+    lines = [f"{name}: {_packets(getattr(report, direction))}" for name, direction in ways]
     late = _milliseconds(p50=report.late_p50_s, p99=report.late_p99_s, max=report.late_max_s)
     lines.append(f"emulator late by: {late}")
     return [*lines, f"warning: {_disturbed(report)}"] if report.is_disturbed else lines
 
 
-def _packets(way: DirectionReport) -> str:
-    lost = way.lost_by_chance + way.lost_in_queue + way.lost_in_outage
-    causes = f"chance {way.lost_by_chance}, queue {way.lost_in_queue}, outage {way.lost_in_outage}"
-    waited = _milliseconds(p50=way.waited_p50_s, p95=way.waited_p95_s, max=way.waited_max_s)
-    passed = f"{way.passed_packets} packets ({way.passed_bytes} bytes) passed"
+def _packets(counts: DirectionReport) -> str:
+    lost = counts.lost_by_chance + counts.lost_in_queue + counts.lost_in_outage
+    causes = (
+        f"chance {counts.lost_by_chance}, queue {counts.lost_in_queue}, "
+        f"outage {counts.lost_in_outage}"
+    )
+    waited = _milliseconds(
+        p50=counts.waited_p50_s, p95=counts.waited_p95_s, max=counts.waited_max_s
+    )
+    passed = f"{counts.passed_packets} packets ({counts.passed_bytes} bytes) passed"
     return f"{passed}, {lost} lost ({causes}), waited: {waited}"
 
 
@@ -128,8 +133,8 @@ def _table(report: LinkReport, seed: int) -> str:
     """Return a row for each direction; the lateness of the emulator is that of both."""
     whole = {"disturbed": report.is_disturbed, "seed": seed}
     rows = []
-    for name, way in _WAYS.items():
-        row = {**asdict(report), **asdict(getattr(report, way)), **whole, "direction": name}
+    for name, direction in _WAYS.items():
+        row = {**asdict(report), **asdict(getattr(report, direction)), **whole, "direction": name}
         rows.append([_cell(row[column]) for column in _MEANINGS])
     return _csv([list(_MEANINGS), *rows])
 

@@ -76,9 +76,9 @@ def _everybody(dispatcher: Dispatcher, event: Event, now: float) -> Iterator[m.C
     entries = [
         entry for entry in registry.entries.values() if entry.device.device_type in (GUARD, ROBOT)
     ]
-    for entry, way in zip(entries, _ways(dispatcher, entries, event), strict=True):
-        why = _why_not(dispatcher, entry, event, way, now) or FREE
-        arrival = way if math.isfinite(way) else None
+    for entry, eta in zip(entries, _ways(dispatcher, entries, event), strict=True):
+        why = _why_not(dispatcher, entry, event, eta, now) or FREE
+        arrival = eta if math.isfinite(eta) else None
         yield m.Candidate(entry.device.id_tag, entry.device.label, why[:256], arrival)
 
 
@@ -100,7 +100,7 @@ def _ways(dispatcher: Dispatcher, entries: list[DeviceEntry], event: Event) -> l
 
 
 def _why_not(
-    dispatcher: Dispatcher, entry: DeviceEntry, event: Event, way: float, now: float
+    dispatcher: Dispatcher, entry: DeviceEntry, event: Event, eta: float, now: float
 ) -> str:
     """Return the first reason why somebody cannot be sent there now; empty: it can."""
     orders = dispatcher.orders
@@ -115,7 +115,7 @@ def _why_not(
         return f"declined an order; is asked again in {entry.free_from - now:.0f} s"
     if entry.position is None:
         return "nobody knows where it is"
-    if not math.isfinite(way):
+    if not math.isfinite(eta):
         return NO_WAY
     if device.device_type == ROBOT:
         return _why_not_a_robot(dispatcher, device.id_tag, event, now)

@@ -335,8 +335,8 @@ class ControlRooms:
         event.handling.taken_off.discard(device)
         self._dispatcher.situations.forget_move(device)
         self._dispatcher.auctions.running.pop(event.number, None)
-        if (way := self._way(entry, event)) is not None:
-            event.handling.expected[device] = now, way
+        if (eta := self._way(entry, event)) is not None:
+            event.handling.expected[device] = now, eta
         event.handling.advised = ""
         order = orders.confirm(event, device, driver, now) if looks else None
         return [*sends, order or orders.act(event, device, now)]
@@ -347,8 +347,8 @@ class ControlRooms:
             return None
         kind = "guard" if entry.device.device_type == GUARD else "robot"
         start = Start(entry.device.id_tag, kind, entry.position)
-        way = float(self._dispatcher.situations.travel([start], [event.position])[1][0, 0])
-        return way if way < float("inf") else None
+        eta = float(self._dispatcher.situations.travel([start], [event.position])[1][0, 0])
+        return eta if eta < float("inf") else None
 
     # --- about all events, or none -----------------------------------------------------
 

@@ -131,9 +131,9 @@ class Dispatcher:
             rng = copy.deepcopy(self._rng)  # a query must not consume random numbers
             for piece in self._advice(view.situation, rng):
                 if isinstance(piece, Assignment) and view.events[piece.task] is event:
-                    way = float(view.situation.eta[piece.task, piece.responder])
+                    eta = float(view.situation.eta[piece.task, piece.responder])
                     device = view.team.entries[piece.responder].device.id_tag
-                    return Advised(device, _task_of(piece, view), way)
+                    return Advised(device, _task_of(piece, view), eta)
         return self._sent_by_itself(event, now)
 
     def _sent_by_itself(self, event: Event, now: float) -> Advised | None:
@@ -196,8 +196,8 @@ class Dispatcher:
         event = view.events[choice.task]
         entry = view.team.entries[choice.responder]
         former = view.team.engaged[choice.responder]
-        way = float(view.situation.eta[choice.task, choice.responder])
-        if task.engaged is not None or not math.isfinite(way):
+        eta = float(view.situation.eta[choice.task, choice.responder])
+        if task.engaged is not None or not math.isfinite(eta):
             return None
         if former is not None and not self.orders.may_preempt(former, now):
             return None
@@ -223,8 +223,8 @@ class Dispatcher:
             return False
         event = view.events[choice.task]
         device = view.team.entries[choice.responder].device
-        way = float(view.situation.eta[choice.task, choice.responder])
-        return self.questions.ask(event, _task_of(choice, view), device.id_tag, way, now)
+        eta = float(view.situation.eta[choice.task, choice.responder])
+        return self.questions.ask(event, _task_of(choice, view), device.id_tag, eta, now)
 
     def somebody_decides(self) -> bool:
         """Return True if a device is there whose people may decide."""
@@ -242,9 +242,9 @@ class Dispatcher:
         if not orders.trail.keeps:
             return
         device = view.team.entries[choice.responder].device.id_tag
-        way = float(view.situation.eta[choice.task, choice.responder])
+        eta = float(view.situation.eta[choice.task, choice.responder])
         event.handling.advised = device
-        event.handling.expected[device] = (now, way)
+        event.handling.expected[device] = (now, eta)
         is_question = self.questions.asks and self.somebody_decides()
         why = f"nobody has decided within {self.questions.within:g} s" if is_question else ""
         fact = Fact(
@@ -255,10 +255,10 @@ class Dispatcher:
             event=event.number,
             device=device,
             task=_task_of(choice, view),
-            arrival_in=way,
+            arrival_in=eta,
             cause=why,
             advised=device,
-            advised_in=way,
+            advised_in=eta,
             waited=now - event.times["detected"],
         )
         orders.decided(event, fact)

@@ -110,8 +110,8 @@ class Handling:
         """Return when a device that was sent is expected to arrive [s from now]."""
         if device not in self.expected:
             return None
-        sent, way = self.expected[device]
-        return max(0.0, sent + way - now)
+        sent, eta = self.expected[device]
+        return max(0.0, sent + eta - now)
 
 
 @dataclass(slots=True)

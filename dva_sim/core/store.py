@@ -368,7 +368,7 @@ def _of_handling(handling: Handling, past: float) -> dict[str, Any] | None:
         "acknowledged": _of_choice(handling.acknowledged, past),
         "note": handling.note,
         "taken_off": sorted(handling.taken_off),
-        "expected": {d: (sent + past, way) for d, (sent, way) in handling.expected.items()},
+        "expected": {d: (sent + past, eta) for d, (sent, eta) in handling.expected.items()},
         "advised": handling.advised,
     }
 
@@ -382,7 +382,7 @@ def _handling(row: dict[str, Any] | None, past: float) -> Handling:
         acknowledged=_choice(row["acknowledged"], past),
         note=row["note"],
         taken_off=set(row["taken_off"]),
-        expected={d: (sent - past, way) for d, (sent, way) in row["expected"].items()},
+        expected={d: (sent - past, eta) for d, (sent, eta) in row["expected"].items()},
         advised=row["advised"],
     )
 

@@ -134,14 +134,16 @@ def _meant(path: Path, kind: str, known: list[str]) -> str:
 
 
 def refuse_to_replace(
-    paths: Iterable[Path], overwrite: bool = False, way: str = "give another name, or --overwrite"
+    paths: Iterable[Path],
+    overwrite: bool = False,
+    remedy: str = "give another name, or --overwrite",
 ) -> None:
     """Refuse to lose anything that an earlier run or command left.
 
     Args:
         paths: Files to be written.
         overwrite: The user has said that it may be replaced.
-        way: Remedy to suggest to the user.
+        remedy: Remedy to suggest to the user.
 
     Raises:
         ConfigError: something is there.
@@ -149,7 +151,7 @@ def refuse_to_replace(
     existing = [path for path in paths if path.is_symlink() or path.exists()]
     if existing and not overwrite:
         more = f" and {len(existing) - 1} more" if len(existing) > 1 else ""
-        raise ConfigError(f"{existing[0]}{more} would be replaced; {way}")
+        raise ConfigError(f"{existing[0]}{more} would be replaced; {remedy}")
 
 
 def is_file(path: Path) -> bool:

@@ -338,7 +338,9 @@ class Security:
     def forget(self, peer: str) -> None:
         """Forget the history of a device that is gone."""
         self._handshakes.pop(peer, None)
-        for socket in [s for s, (way, _) in self._greetings.items() if way[1] == peer]:
+        for socket in [
+            s for s, (connection, _) in self._greetings.items() if connection[1] == peer
+        ]:
             self._end_greeting(socket)
 
     def release(self, socket: Socket) -> None:
@@ -452,25 +454,25 @@ class Security:
             self._note_client(watch.device, watch.peer, endpoint, event, value)
 
     def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
-        way = device, peer, endpoint
+        connection = device, peer, endpoint
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
-            self._handshakes.get(peer, {}).pop(way, None)
-            for socket in [s for s, (at, _) in self._greetings.items() if at == way]:
+            self._handshakes.get(peer, {}).pop(connection, None)
+            for socket in [s for s, (at, _) in self._greetings.items() if at == connection]:
                 self._end_greeting(socket)
             return
-        handshake = self._handshakes.setdefault(peer, {}).setdefault(way, _Handshake())
+        handshake = self._handshakes.setdefault(peer, {}).setdefault(connection, _Handshake())
         reason, why = at_client(self._has_keys, device, peer, event, value)
         self.refused[device, reason] += 1
         handshake.latest = Refusal(device, peer, endpoint, reason, why)
         if event != zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL or value == errno.EAGAIN:
             self._tell_once(handshake)
             if reason in (Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER):
-                self._greet(way, handshake)  # the server may not have heard why
+                self._greet(connection, handshake)  # the server may not have heard why
             return
         # A connection may break in its handshake by chance, but hardly again and again.
         handshake.hang_ups += 1
         if handshake.hang_ups == MAX_HANGUPS:
-            self._greet(way, handshake)
+            self._greet(connection, handshake)
         elif handshake.hang_ups == 2 * MAX_HANGUPS and not handshake.reported:
             # A greeting has not helped.
             self._tell_once(handshake)
@@ -481,25 +483,27 @@ class Security:
             handshake.reported.add(refusal.reason)
             self._tell(refusal)
 
-    def _greet(self, way: _Way, handshake: _Handshake) -> None:
+    def _greet(self, connection: _Way, handshake: _Handshake) -> None:
         """Find out, and let the other end find out, whether one has keys and one has none."""
         if not handshake.greeted:
             handshake.greeted = True
-            greeting = Greeting(self._context, way[2], "NULL" if self._ring is None else "CURVE")
-            self._greetings[greeting.socket] = way, greeting
+            greeting = Greeting(
+                self._context, connection[2], "NULL" if self._ring is None else "CURVE"
+            )
+            self._greetings[greeting.socket] = connection, greeting
             self._poller.register(greeting.socket)
 
     def _read_greeting(self, socket: Socket) -> None:
-        way, greeting = self._greetings[socket]
+        connection, greeting = self._greetings[socket]
         greeting.read()
         if greeting.done:
             self._end_greeting(socket)
-        handshake = self._handshakes.get(way[1], {}).get(way)
+        handshake = self._handshakes.get(connection[1], {}).get(connection)
         # The news of the end may fail to come: what the other end speaks is enough to conclude.
         is_open = greeting.theirs is None and not greeting.done
         if is_open or handshake is None or handshake.reported:
             return
-        device, peer, endpoint = way
+        device, peer, endpoint = connection
         if greeting.theirs not in (None, greeting.mechanism):
             reason, why = at_mismatch(self._has_keys, peer)
             handshake.latest = Refusal(device, peer, endpoint, reason, why)

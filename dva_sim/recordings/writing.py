@@ -145,8 +145,8 @@ def check_both(target: Path, overwrite: bool) -> None:
         ConfigError: either is there, or nothing can be written.
     """
     part = target.with_name(target.name + PART)
-    way = f"dva-sim replay {part} --mcap NAME keeps it; give another name, or --overwrite"
-    refuse_to_replace([part], overwrite, way)
+    remedy = f"dva-sim replay {part} --mcap NAME keeps it; give another name, or --overwrite"
+    refuse_to_replace([part], overwrite, remedy)
     check_target(target, overwrite)
 
 

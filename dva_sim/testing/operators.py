@@ -204,14 +204,14 @@ class _Trial:
     def _ways(self) -> Iterator[Case]:
         """Yield ways to their end, within a wide corridor; and there it stays."""
         for name, corners in ROUTES.items():
-            way = LineString(corners)
+            route_line = LineString(corners)
             for delay in DELAYS:
                 case = f"{name}, delay {delay:g} s"
                 full = _way(corners).length / ROBOTS[0].speed
                 track = self._drive(
                     self._persons[0], ROBOTS[0], name, delay, MAX_TIME_FACTOR * full
                 )
-                off = max(way.distance(Point(step.x, step.y)) for step in track)
+                off = max(route_line.distance(Point(step.x, step.y)) for step in track)
                 arrived = [s.time for s in track if math.dist((s.x, s.y), corners[-1]) < 1.5 * STOP]
                 if off > CORRIDOR:
                     yield "leaves a wide corridor", f"{case}: by {off:.1f} m"

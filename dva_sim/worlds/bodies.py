@@ -95,8 +95,8 @@ class Jam:
         return self._since >= JAM_TIME and self._near(x, y, heading)
 
     def _near(self, x: float, y: float, heading: float) -> bool:
-        way = math.hypot(x - self._x, y - self._y)
-        return way < JAM_WAY and abs(heading - self._heading) < JAM_TURN
+        distance = math.hypot(x - self._x, y - self._y)
+        return distance < JAM_WAY and abs(heading - self._heading) < JAM_TURN
 
 
 US: Final = 1_000_000

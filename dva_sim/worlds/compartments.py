@@ -53,7 +53,7 @@ def of_rooms(
     indoor = [room for room in rooms if not room.outdoor]
     compartments = [Compartment(r.name, _area(r), r.ceiling, r.polygon) for r in indoor]
     lookup = Lookup(rooms)
-    doors = [opening for way in ways for opening in _passage(lookup, *way)]
+    doors = [opening for passage in ways for opening in _passage(lookup, *passage)]
     borders = _borders(indoor, walls, [ends for ends, _, _ in ways])
     return FloorPartition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
 
@@ -126,8 +126,8 @@ def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, flo
     b = np.array(ends[2:])
     along = (b - a) / np.hypot(*(b - a)) * TOUCHING_M
     a, b = (
-        end + way if closed.distance(shapely.Point(end)) < 1e-6 else end
-        for end, way in ((a, -along), (b, along))
+        end + step if closed.distance(shapely.Point(end)) < 1e-6 else end
+        for end, step in ((a, -along), (b, along))
     )
     return float(a[0]), float(a[1]), float(b[0]), float(b[1])
 

@@ -176,8 +176,8 @@ def _open_walls(
     drawn = shapely.union_all([*lines, *_rims(rooms, shapely.union_all(ground + solids))])
     doors = [feature.shape for feature in kinds["door"]] + [
         feature.shape
-        for feature, way in zip(kinds["exit"], exits, strict=True)
-        if _how_far_out(lookup, way.x, way.y, way.heading) < NOTHING
+        for feature, exit_ in zip(kinds["exit"], exits, strict=True)
+        if _how_far_out(lookup, exit_.x, exit_.y, exit_.heading) < NOTHING
     ]
     doorways = [door.buffer(DOOR_REACH, cap_style="flat") for door in doors]
     opened = shapely.difference(drawn, shapely.union_all(doorways))

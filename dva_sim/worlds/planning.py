@@ -69,8 +69,8 @@ class Planner:
             Points about `STEP` apart, shape `(n, 2)`, or None if no path exists.
         """
         roadmap = self._roadmap.around(tuple(avoid)) if avoid else self._roadmap
-        way = roadmap.way(_plain(start), _plain(goal))
-        return None if way is None else way.copy()
+        path = roadmap.way(_plain(start), _plain(goal))
+        return None if path is None else path.copy()
 
     def room_at(self, points: Floats) -> Floats:
         """Return the distance from each of many points `(n, 2)` to the nearest wall [m]."""
@@ -176,8 +176,8 @@ class Roadmap:
 
     def _length(self, start: Point, goal: Point) -> float:
         """Return the length of the path [m]; infinite if there is none."""
-        way = self.way(start, goal)
-        return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
+        path = self.way(start, goal)
+        return math.inf if path is None else float(np.hypot(*np.diff(path, axis=0).T).sum())
 
     def cost(self, start: Point, goal: Point) -> float:
         """Return the cost of the path in the graph: the same in both directions."""
@@ -293,11 +293,11 @@ def _both_ways(graph: Any) -> Any:
 
 def _points_between(a: Floats, b: Floats, count: int) -> Floats:
     """Interpolate between two points as `np.linspace` does, to the last bit, but faster."""
-    way = b - a
+    span = b - a
     last = count - 1
-    step = way / last
+    step = span / last
     numbers = np.arange(count, dtype=np.float64)[:, None]
-    points: Floats = numbers * step if step.all() else numbers / last * way
+    points: Floats = numbers * step if step.all() else numbers / last * span
     points += a
     points[-1] = b
     return points

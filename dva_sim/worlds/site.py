@@ -144,7 +144,7 @@ class Site(FloorPlan):
         doors = zip(self.doors.tolist(), heights, strict=True)
         ways = [
             *((ends, height, "door") for ends, height in doors),
-            *((way.ends, DOOR_HEIGHT, "exit") for way in self.exits),
+            *((exit_.ends, DOOR_HEIGHT, "exit") for exit_ in self.exits),
         ]
         return of_rooms(self.grid, self.rooms, self.walls, ways)
 
@@ -238,8 +238,8 @@ class Site(FloorPlan):
     def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
         """Return the flat indices of the cells that `sample_free` chooses from."""
         grid = self.grid
-        way = min(clearance, FOOTPRINT)
-        reached = self.kept(("reached", way), lambda: grid.reachable(way))
+        margin = min(clearance, FOOTPRINT)
+        reached = self.kept(("reached", margin), lambda: grid.reachable(margin))
         free = reached & (grid.clearance >= clearance)
         if room is None:
             return np.flatnonzero(free)

@@ -59,9 +59,9 @@ def features_of(site: Site) -> Iterator[Feature]:
     heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
     for ends, height in zip(site.doors, heights, strict=True):
         yield Feature("door", shapely.LineString(ends.reshape(2, 2)), {"height_m": height})
-    for way in site.exits:
-        x1, y1, x2, y2 = way.ends
-        yield Feature("exit", shapely.LineString([(x1, y1), (x2, y2)]), {"name": way.name})
+    for exit_ in site.exits:
+        x1, y1, x2, y2 = exit_.ends
+        yield Feature("exit", shapely.LineString([(x1, y1), (x2, y2)]), {"name": exit_.name})
     for zone in site.zones:
         area = zone.area
         yield Feature("zone", area, {"name": zone.name, "use": zone.use})

@@ -96,8 +96,8 @@ def draw_site(
         _draw_grid(ax, site)
     _draw_walls(ax, site)
     _draw_doors(ax, site)
-    for way in site.exits:
-        _draw_exit(ax, way)
+    for exit_ in site.exits:
+        _draw_exit(ax, exit_)
     if coverage:
         _draw_coverage(ax, site)
     if views:
@@ -195,19 +195,20 @@ def _hung(site: Site, busy: Counter[str], ends: Floats) -> tuple[Floats, Floats]
     aside = 0.3 * np.array([-along[1], along[0]])
     middle = (hinge + jamb) / 2
     left, right = (
-        busy.get(site.room_at(*(middle + way).tolist()) or "", math.inf) for way in (aside, -aside)
+        busy.get(site.room_at(*(middle + offset).tolist()) or "", math.inf)
+        for offset in (aside, -aside)
     )
     return (hinge, jamb) if left <= right else (jamb, hinge)
 
 
-def _draw_exit(ax: Axes, way: Exit) -> None:
+def _draw_exit(ax: Axes, exit_: Exit) -> None:
     """Draw a green bar in the wall and an arrow outwards."""
-    x1, y1, x2, y2 = way.ends
+    x1, y1, x2, y2 = exit_.ends
     ax.plot([x1, x2], [y1, y2], color=EXIT, lw=2.4, solid_capstyle="butt", zorder=3.2)
-    out = np.array([math.cos(way.heading), math.sin(way.heading)])
+    out = np.array([math.cos(exit_.heading), math.sin(exit_.heading)])
     side = np.array([-out[1], out[0]])
-    size = min(0.62, 0.45 * way.width)
-    foot = np.array([way.x, way.y]) + 0.12 * out
+    size = min(0.62, 0.45 * exit_.width)
+    foot = np.array([exit_.x, exit_.y]) + 0.12 * out
     corners = [foot + 0.8 * size * side, foot + size * out, foot - 0.8 * size * side]
     ax.fill(*np.array(corners).T, color=EXIT, lw=0, zorder=3.2)
 

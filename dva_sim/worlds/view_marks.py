@@ -203,7 +203,7 @@ def _things(site: Site) -> list[Any]:
     marks += [(c.x, c.y, 0.3) for c in site.cameras]
     marks += [(p.x, p.y, 0.5) for p in (*site.robot_bases, *site.guard_posts)]
     marks += [(p.x, p.y, 0.9) for p in site.operator_desks]
-    marks += [(way.x, way.y, 1.0) for way in site.exits]
+    marks += [(exit_.x, exit_.y, 1.0) for exit_ in site.exits]
     leaves = [((a + c) / 2, (b + d) / 2, 0.9) for a, b, c, d in site.doors.tolist()]
     discs = [shapely.Point(x, y).buffer(radius) for x, y, radius in marks + leaves]
     return [*discs, *(shapely.Polygon(corners) for corners in site.solids)]

@@ -88,8 +88,10 @@ def refuges_of(site: Site) -> list[Point]:
     """
     if not site.exits:
         return [(pose.x, pose.y) for pose in site.guard_posts or site.robot_bases]
-    ways = [(way, math.cos(way.heading), math.sin(way.heading)) for way in site.exits]
-    return [(way.x - INDOORS_MARGIN_M * dx, way.y - INDOORS_MARGIN_M * dy) for way, dx, dy in ways]
+    ways = [(exit_, math.cos(exit_.heading), math.sin(exit_.heading)) for exit_ in site.exits]
+    return [
+        (exit_.x - INDOORS_MARGIN_M * dx, exit_.y - INDOORS_MARGIN_M * dy) for exit_, dx, dy in ways
+    ]
 
 
 def choose_escape(
@@ -130,9 +132,9 @@ def _keeping(
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
         hazardous: dict[Point, None] = {}
-        for refuge, way in _nearest_first(planner, here, refuges, avoid):
-            judged = [_judge(way, one, habits.close_m) for one in limits[:-1]]
-            judged.append(_judge(way, limits[-1], math.inf))
+        for refuge, path in _nearest_first(planner, here, refuges, avoid):
+            judged = [_judge(path, one, habits.close_m) for one in limits[:-1]]
+            judged.append(_judge(path, limits[-1], math.inf))
             if all(will_do for will_do, _ in judged):
                 return Escape(refuge, avoid)
             hazardous.update((place, None) for _, bad in judged for place in bad)
@@ -152,34 +154,34 @@ def _nearest_first(
     planned: list[tuple[float, int, Floats]] = []
     for straight, number in sorted((math.dist(here, at), n) for n, at in enumerate(refuges)):
         while planned and planned[0][0] < straight - ROUNDING:
-            _, nearest, way = heappop(planned)
-            yield refuges[nearest], way
+            _, nearest, path = heappop(planned)
+            yield refuges[nearest], path
         way_there = planner.path(here, refuges[number], avoid)
         if way_there is not None:
             heappush(planned, (_length(way_there), number, way_there))
-    for _, nearest, way in sorted(planned, key=lambda one: one[:2]):
-        yield refuges[nearest], way
+    for _, nearest, path in sorted(planned, key=lambda one: one[:2]):
+        yield refuges[nearest], path
 
 
-def _judge(way: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Point]]:
+def _judge(path: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Point]]:
     """Return whether a path keeps a limit, and the bad places to avoid.
 
     No way keeps it that is bad from begin to end, and longer than `close` [m]: only who stands
     in what is deadly runs however far, if it gets no worse.
     """
-    steps = max(1, round(EVERY / float(np.hypot(*(way[1] - way[0])) or EVERY)))
-    places = [(float(x), float(y)) for x, y in way[:-1:steps]]
+    steps = max(1, round(EVERY / float(np.hypot(*(path[1] - path[0])) or EVERY)))
+    places = [(float(x), float(y)) for x, y in path[:-1:steps]]
     strains = [float(limit(place)) for place in places]
     leaves = (i for i, s in enumerate(strains) if s < 1.0 or s > strains[0])
     first = next(leaves, len(places))
     bad = [p for p, s in zip(places[first:], strains[first:], strict=True) if s >= 1.0]
-    comes_out = first < len(places) or _length(way) <= close
+    comes_out = first < len(places) or _length(path) <= close
     return comes_out and not bad, bad
 
 
-def _length(way: Floats) -> float:
+def _length(path: Floats) -> float:
     """Return the length of a path [m]."""
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 PERIOD: Final = 0.5  # design: between two looks at the air [s]

@@ -123,12 +123,12 @@ class GuardAgent(OnFoot):
         """Offer to go, by what only this guard knows: its pace, and where it stands now."""
         if self._protocol.order is not None:
             return
-        way = self._planner.distance(self.walking.place, self._xy(announced.position))
+        distance = self._planner.distance(self.walking.place, self._xy(announced.position))
         under_way = (
             self._protocol.errand is not None and self._protocol.ready_at <= self.device.clock.now
         )
         ready = 0.0 if under_way else self._walker.usual_mobilisation
-        arrival = ready + way / self._walker.speed
+        arrival = ready + distance / self._walker.speed
         if arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 

@@ -154,12 +154,12 @@ def middles_of(doors: Floats, narrow: float) -> Floats:
     return middles[widths < narrow]
 
 
-def doors_on(way: Floats, middles: Floats) -> list[Door]:
+def doors_on(path: Floats, middles: Floats) -> list[Door]:
     """Return the doors that a way `(n, 2)` goes through, in its order."""
     if not len(middles):
         return []
-    gaps = np.hypot(*(way[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(way, axis=0).T))]
+    gaps = np.hypot(*(path[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))]
     near = np.flatnonzero(gaps.min(axis=1) < 0.5)
     doors = [Door(float(along[gaps[i].argmin()]), *middles[i].tolist()) for i in near]
     return sorted(doors, key=lambda door: door.along)

@@ -113,8 +113,8 @@ class PersonGuard(OnFoot):
         if self.order is None:
             return None
         place = self._xy(self.order.position)
-        way = self._planner.path(self.walking.place, place)
-        points = [] if way is None else [[round(x, 2), round(y, 2)] for x, y in way.tolist()]
+        path = self._planner.path(self.walking.place, place)
+        points = [] if path is None else [[round(x, 2), round(y, 2)] for x, y in path.tolist()]
         return place, self._planner.distance(self.walking.place, place), points
 
     # --- what the person does ----------------------------------------------------------------
@@ -272,8 +272,8 @@ class PersonGuard(OnFoot):
             self._give_back("declined", "nobody sits here")
 
     def _bid(self, announced: m.TaskAnnouncement) -> None:
-        way = self._planner.distance(self.walking.place, self._xy(announced.position))
-        arrival = self._walker.usual_mobilisation + way / self._walker.speed
+        distance = self._planner.distance(self.walking.place, self._xy(announced.position))
+        arrival = self._walker.usual_mobilisation + distance / self._walker.speed
         if self.order is None and arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 

@@ -115,19 +115,19 @@ class Avoidance:
             others: Others nearby.
             last: The side that was chosen before [m].
         """
-        way = np.arange(0.0, min(LOOK_AHEAD_M, route.length - along) + STEP, STEP)
-        base = np.array([route.point_at(along + s) for s in way.tolist()])
+        along_lane = np.arange(0.0, min(LOOK_AHEAD_M, route.length - along) + STEP, STEP)
+        base = np.array([route.point_at(along + s) for s in along_lane.tolist()])
         left = _to_the_left(base)
         # Written out: a product of arrays is rounded as the processor's library likes.
         east = here[0] - float(base[0, 0])
         north = here[1] - float(base[0, 1])
         offset = east * float(left[0, 0]) + north * float(left[0, 1])
-        places = self._foreseen(way, here, others)
+        places = self._foreseen(along_lane, here, others)
         if last == 0.0:  # then nothing is better than the planned way
-            points = base + _shifts(way, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
+            points = base + _shifts(along_lane, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
             if self._are_free(points, places, others)[1].all():
                 return Lane(points[0], 0.0)
-        points = base + _shifts(way, offset, _SIDES, _HOLDS)[..., None] * left
+        points = base + _shifts(along_lane, offset, _SIDES, _HOLDS)[..., None] * left
         walls = self._keeps_to_walls(points, base)
         gaps, free = self._are_free(points, places, others)
         keep = _keeps(others)
@@ -140,7 +140,7 @@ class Avoidance:
         choices = np.flatnonzero(walls.all(axis=1))
         best = int(choices[np.argmin((lack + 0.05 * cost)[choices])])
         lane = Lane(points[best], float(_SIDES[best]))
-        return _blocked(others, gaps[:, best], keep[:, 0], way, lane)
+        return _blocked(others, gaps[:, best], keep[:, 0], along_lane, lane)
 
     def _keeps_to_walls(self, points: Floats, base: Floats) -> NDArray[np.bool_]:
         """Return where lanes `(k, n, 2)` have room; the planned path has as much as there is."""
@@ -151,14 +151,14 @@ class Avoidance:
         keeps[0] = True
         return keeps
 
-    def _foreseen(self, way: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
+    def _foreseen(self, along_lane: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
         """Predict where others will be along one's path: `(2, others, n)` [m].
 
         One with the right of way is expected to keep moving; the other to stay where it is.
         """
         x, y, vx, vy = np.array([(o.x, o.y, o.vx, o.vy) for o in others]).T[..., None]
         first = np.array(self.yields_to(here, others))[:, None]
-        time = np.minimum(way / PACE, FORESEEN) * first
+        time = np.minimum(along_lane / PACE, FORESEEN) * first
         return np.stack([x + vx * time, y + vy * time])
 
     def _are_free(
@@ -220,11 +220,11 @@ class Avoidance:
 
 
 def _blocked(
-    others: Sequence[Nearby], gaps: Floats, keep: Floats, way: Floats, lane: Lane
+    others: Sequence[Nearby], gaps: Floats, keep: Floats, along_lane: Floats, lane: Lane
 ) -> Blocked:
     """Return who blocks a lane first: gaps `(others, n)` and distances to keep `(others, 1)`."""
     tight = gaps < keep
-    at = np.where(tight.any(axis=1), way[tight.argmax(axis=1)], math.inf)
+    at = np.where(tight.any(axis=1), along_lane[tight.argmax(axis=1)], math.inf)
     order = np.lexsort((gaps.min(axis=1), at))
     first = int(order[0])
     return Blocked(others[first], min(float(at[first]), LOOK_AHEAD_M), float(gaps.min()), lane)
@@ -261,10 +261,10 @@ def _gradient(points: Floats) -> Floats:
     return between
 
 
-def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
+def _shifts(along_lane: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
     """Return the lateral offsets of lanes, from the present one, aside and back: `(k, n)` [m]."""
-    out = np.minimum(way / RAMP, 1.0)
-    back = np.minimum(np.maximum((way - holds[:, None]) / RAMP, 0.0), 1.0)
+    out = np.minimum(along_lane / RAMP, 1.0)
+    back = np.minimum(np.maximum((along_lane - holds[:, None]) / RAMP, 0.0), 1.0)
     side = sides[:, None]
     return np.asarray(offset + (side - offset) * out - side * back)
 

@@ -162,15 +162,15 @@ class CollisionGuard:
             others: Others nearby, at their current positions.
             reach: Look no farther than that [m].
         """
-        way = np.arange(0.0, reach + STEP, STEP)
-        points = _arc(pose, turn_rate / speed, way)
+        lengths = np.arange(0.0, reach + STEP, STEP)
+        points = _arc(pose, turn_rate / speed, lengths)
         gaps = [(self.room_at(points) - self.radius, KEEP_WALL)]
         for other in others:
             gap = np.hypot(points[:, 0] - other.x, points[:, 1] - other.y)
             gaps.append((gap - self.radius - other.radius, other.keep))
         stops = [_first(gap < min(keep, float(gap[0]) - STEADY_GAP_M)) for gap, keep in gaps]
         first = min(stops)
-        return reach if first >= len(way) else float(max(way[first] - STEP, 0.0))
+        return reach if first >= len(lengths) else float(max(lengths[first] - STEP, 0.0))
 
 
 def _first(flags: NDArray[np.bool_]) -> int:
@@ -179,12 +179,12 @@ def _first(flags: NDArray[np.bool_]) -> int:
     return at if flags[at] else len(flags)
 
 
-def _arc(pose: tuple[float, float, float], curvature: float, way: Floats) -> Floats:
+def _arc(pose: tuple[float, float, float], curvature: float, lengths: Floats) -> Floats:
     """Return points `(n, 2)` along an arc that begins at a pose.
 
-    `curvature` [1/m], `way` `(n,)` [m].
+    `curvature` [1/m], `lengths` `(n,)` [m].
     """
     x, y, heading = pose
-    half = 0.5 * curvature * way
-    chord = way * np.sinc(half / math.pi)
+    half = 0.5 * curvature * lengths
+    chord = lengths * np.sinc(half / math.pi)
     return np.stack([x + chord * np.cos(heading + half), y + chord * np.sin(heading + half)], 1)

@@ -140,10 +140,10 @@ class Aside(Manoeuvre):
     reason = "somebody is in the way"
 
     def __init__(
-        self, seen: Sensed, place: Point, way: Floats, radius: float, most_turn: float
+        self, seen: Sensed, place: Point, path: Floats, radius: float, most_turn: float
     ) -> None:
         self._place = place
-        self._way = way
+        self._way = path
         self._radius = radius
         self._turn = most_turn
         self._until = seen.now + MAX_ASIDE

@@ -315,12 +315,12 @@ class Pilot:
     def _step_aside(
         self, seen: Sensed, route: Route, along: float, other: Nearby
     ) -> PilotStep | None:
-        way = np.array([route.point_at(along + s) for s in np.arange(-1.0, 6.0, 0.2).tolist()])
-        place = self._avoidance.refuge(seen.here, way, seen.nearby)
+        path = np.array([route.point_at(along + s) for s in np.arange(-1.0, 6.0, 0.2).tolist()])
+        place = self._avoidance.refuge(seen.here, path, seen.nearby)
         self._left_aside = other.name
         if place is None:
             return None
-        self._manoeuvre = Aside(seen, place, way, self._radius, self._reach.turn_rate)
+        self._manoeuvre = Aside(seen, place, path, self._radius, self._reach.turn_rate)
         return self._go_on_with(self._manoeuvre, seen)
 
     def _way_around(self, seen: Sensed) -> PilotStep | None:

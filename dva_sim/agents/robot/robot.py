@@ -582,8 +582,8 @@ class RobotAgent:
         place = announced.position
         pose = self.body.pose()
         goal = self.device.frame.to_xy(place.latitude, place.longitude)
-        way = self._planner.distance((pose.x, pose.y), goal)
-        arrival = EXPECTED_READY + way / EXPECTED_SPEED
+        distance = self._planner.distance((pose.x, pose.y), goal)
+        arrival = EXPECTED_READY + distance / EXPECTED_SPEED
         if arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 

@@ -85,10 +85,10 @@ class Hand:
         far = self._max_tilt
         pitch = -far if pitch < -far else far if pitch > far else pitch
         roll = -far if roll < -far else far if roll > far else roll
-        way = (pitch - self._pitch) * (1.0 - keep)
-        self._pitch += -most if way < -most else most if way > most else way
-        way = (roll - self._roll) * (1.0 - keep)
-        self._roll += -most if way < -most else most if way > most else way
+        turn = (pitch - self._pitch) * (1.0 - keep)
+        self._pitch += -most if turn < -most else most if turn > most else turn
+        turn = (roll - self._roll) * (1.0 - keep)
+        self._roll += -most if turn < -most else most if turn > most else turn
         self._shake_pitch = one = self._shake_pitch * swing + one * drive
         self._shake_roll = other = self._shake_roll * swing + other * drive
         return self._pitch + self._tremor * one.real, self._roll + self._tremor * other.real

@@ -76,14 +76,14 @@ class Coverage(Policy):
         self, cover: Cover, guards: Sequence[int], bound_for: Mapping[int, int | None]
     ) -> Floats:
         """Return times from each guard to each zone by way of a station [s], `(guards, zones)`."""
-        way = cover.eta[list(guards)]
-        way = np.where(way <= self.there_s, 0.0, way)
+        eta = cover.eta[list(guards)]
+        eta = np.where(eta <= self.there_s, 0.0, eta)
         for row, guard in enumerate(guards):
             station = bound_for.get(guard)
             if station is not None:
-                way[row] = np.inf
-                way[row, station] = 0.0
-        response: Floats = (way[:, :, None] + cover.reach[None, :, :]).min(axis=1)
+                eta[row] = np.inf
+                eta[row, station] = 0.0
+        response: Floats = (eta[:, :, None] + cover.reach[None, :, :]).min(axis=1)
         return np.minimum(response, _UNREACHED)
 
 

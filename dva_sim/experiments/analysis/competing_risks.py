@@ -102,10 +102,10 @@ class Endings:
     def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Return shares by the horizon, each with its 95 % interval over persons."""
         mask = self.under(line, stop, panel)
-        way = self.way[mask]
+        ending = self.way[mask]
         time = self.time[mask]
         person = self._person[mask]
-        causes = list(np.where(way == NOTHING, "", way))
+        causes = list(np.where(ending == NOTHING, "", ending))
         incidence = cumulative_incidence(time, causes, self.horizon, person)
         never = share_interval(np.zeros(len(person)), person)
         shares = {w: incidence.causes.get(w, never) for w in self.ways} | {
@@ -161,19 +161,19 @@ def horizon_of(view: StudyView, scenario: Mapping[str, Any]) -> float:
 def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Floats]:
     """Return the first outcome of each event, and its time since the report [s]."""
     outcome = rows["outcome"].astype(str)
-    way = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
-    way = np.where((way == "escalated") & (drives != ""), drives, way)
+    ending = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
+    ending = np.where((ending == "escalated") & (drives != ""), drives, ending)
     confirmed_at = as_floats(rows["confirmation_s"])
     closed_at = as_floats(rows["closing_s"])
     confirmed = np.isfinite(confirmed_at)
-    way = np.where(confirmed, CONFIRMED, way)
+    ending = np.where(confirmed, CONFIRMED, ending)
     if "is_true" in rows:
         is_false = ~rows["is_true"].astype(bool)
-        way = np.where(is_false & (way == "refuted"), CLEARED, way)
-        way = np.where(is_false & confirmed, "false alarm confirmed", way)
+        ending = np.where(is_false & (ending == "refuted"), CLEARED, ending)
+        ending = np.where(is_false & confirmed, "false alarm confirmed", ending)
     time = np.where(confirmed, confirmed_at, closed_at)
-    time = np.where(way == NOTHING, as_floats(rows["watched_s"]), time)
-    return way, np.where(way == "never reported", 0.0, time)
+    time = np.where(ending == NOTHING, as_floats(rows["watched_s"]), time)
+    return ending, np.where(ending == "never reported", 0.0, time)
 
 
 def _how_drives_ended(rows: Table, runs: Table) -> NDArray[np.str_]:

@@ -110,8 +110,8 @@ def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
     """Return the round trip, and what the first answer over a new connection takes [s]."""
     delay = of("link.delay_s")
     processing = of("robot.processing_s")
-    ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))
-    trip = float(sum(delay if way is None else way for way in ways))
+    ways = (of(f"link.{direction}.delay_s") for direction in ("up", "down"))
+    trip = float(sum(delay if direction is None else direction for direction in ways))
     mean = processing["mean_s"] if isinstance(processing, Mapping) else processing
     return trip, TRIPS_OF_A_START * trip + float(mean)
 

@@ -125,9 +125,9 @@ def _side(view: StudyView, ended: Ended) -> str:
     """Return `REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
     name = level_name(view.line.name, ended.line) if view.line else "all"
     clauses = [
-        f"{way} {_share(share)}"
-        for way, share in ended.shares.items()
-        if share.mean > 0 or way == CONFIRMED
+        f"{ending} {_share(share)}"
+        for ending, share in ended.shares.items()
+        if share.mean > 0 or ending == CONFIRMED
     ]
     return f"{name}: {listing(clauses)}"
 

@@ -136,5 +136,5 @@ class LinkReport:
     def from_json(cls, text: str) -> LinkReport:
         """Return the report of such a line."""
         data: dict[str, Any] = json.loads(text)
-        up, down = (DirectionReport(**data.pop(way)) for way in ("up", "down"))
+        up, down = (DirectionReport(**data.pop(direction)) for direction in ("up", "down"))
         return cls(up, down, **data)

@@ -35,9 +35,9 @@ def main(parent: int, control: int) -> None:
         job = json.loads(channel.recv(1 << 20))
         os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
         try:
-            way = become_owner(job["rootless"])
+            rights = become_owner(job["rootless"])
             die_with_parent(parent)
-            spaces = [] if way == "root" else [os.open("/proc/self/ns/user", os.O_RDONLY)]
+            spaces = [] if rights == "root" else [os.open("/proc/self/ns/user", os.O_RDONLY)]
             ends = [_make_end(end) for end in (NEAR_END, FAR_END)]
         except OSError as error:
             channel.send(json.dumps({"problem": error.strerror or str(error)}).encode())

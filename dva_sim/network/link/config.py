@@ -105,21 +105,21 @@ class LinkConfig(Config):
 
     @model_validator(mode="after")
     def _causal(self) -> LinkConfig:
-        for way in (self.toward("up"), self.toward("down")) if self.up or self.down else (self,):
-            if way.jitter_s > way.delay_s:
-                raise ValueError(f"jitter_s {way.jitter_s:g} is above delay_s {way.delay_s:g}")
+        for link in (self.toward("up"), self.toward("down")) if self.up or self.down else (self,):
+            if link.jitter_s > link.delay_s:
+                raise ValueError(f"jitter_s {link.jitter_s:g} is above delay_s {link.delay_s:g}")
             spread = {
-                "jitter_s": way.jitter_s > 0,
-                "delay_law": way.law is not None,
-                "delay_log": way.delay_log is not None,
+                "jitter_s": link.jitter_s > 0,
+                "delay_law": link.law is not None,
+                "delay_log": link.delay_log is not None,
             }
             keys = [key for key, is_given in spread.items() if is_given]
             if len(keys) > 1:
                 raise ValueError(f"{keys[0]} and {keys[1]} exclude each other")
-            if way.law is not None:
-                way.law.check(way.delay_s)
-            if way.bursts is not None:
-                way.bursts.check(way.loss)
+            if link.law is not None:
+                link.law.check(link.delay_s)
+            if link.bursts is not None:
+                link.bursts.check(link.loss)
         return self
 
     @property

@@ -63,36 +63,36 @@ class Link:
         direction: Direction = "up",
         by_packet: bool = False,
     ) -> None:
-        way = config.toward(direction)
+        link = config.toward(direction)
         self.offered = self.lost = self.cut = self.dropped = self.bytes = 0
         self._make_numbers: MakeNumbers = FastNoise
         if by_packet:
             self._make_numbers = partial(PacketNumbers, number=lambda: self.offered)
         self.name = name
         self.rate_bps = serialiser.rate_bps
-        self.room = way.queue_bytes
+        self.room = link.queue_bytes
         self._line = serialiser
         self._streams = streams
         self._direction = direction
-        if way.queue_packets is not None:
-            serialiser = PacketQueue(serialiser, way.queue_packets)
-            self.room = way.queue_packets * MIN_PACKET
+        if link.queue_packets is not None:
+            serialiser = PacketQueue(serialiser, link.queue_packets)
+            self.room = link.queue_packets * MIN_PACKET
         self._serialiser = serialiser
         self._offer = serialiser.offer
-        self._counts_packets = way.queue_packets is not None
+        self._counts_packets = link.queue_packets is not None
         self._last_arrival = 0.0
-        self._take(way)
+        self._take(link)
 
-    def _take(self, way: LinkConfig) -> None:
+    def _take(self, link: LinkConfig) -> None:
         """Be like this from now on, but for the queue."""
-        replay = _make_replay(way, self._direction, self._streams, self.name)
-        self.delay = way.moments()[0]
-        self._base = way.delay_s
+        replay = _make_replay(link, self._direction, self._streams, self.name)
+        self.delay = link.moments()[0]
+        self._base = link.delay_s
         drawing = self._streams, self.name, self._make_numbers
-        self._fates = _make_fates(way, replay, *drawing)
-        self._outage = gaps_of(way.outages) if way.outages else None
-        self._wobble = replay.deviation if replay else _make_wobble(way, *drawing)
-        self._may_overtake = way.reorder
+        self._fates = _make_fates(link, replay, *drawing)
+        self._outage = gaps_of(link.outages) if link.outages else None
+        self._wobble = replay.deviation if replay else _make_wobble(link, *drawing)
+        self._may_overtake = link.reorder
         self._is_steady = not self._fates and self._outage is None and self._wobble is None
         self._takes_trains = self._is_steady and not self._counts_packets
 
@@ -106,14 +106,14 @@ class Link:
         Raises:
             ConfigError: a recorded delay cannot be read.
         """
-        way = config.toward(self._direction)
+        link = config.toward(self._direction)
         before = self._last_arrival
         if self._wobble is None:
             before = max(before, self._serialiser.last_departure() + self._base)
-        self._take(way)
+        self._take(link)
         if isinstance(self._line, ConstantRate):
-            self._line.change_rate(now, way.rate_bps)
-            self.rate_bps = way.rate_bps
+            self._line.change_rate(now, link.rate_bps)
+            self.rate_bps = link.rate_bps
         if not self._may_overtake:
             self._last_arrival = max(self._last_arrival, before)
             self._wobble = self._wobble or _no_deviation
@@ -212,41 +212,41 @@ def make_serialiser(
 
 
 def _make_fates(
-    way: LinkConfig, replay: Replay | None, streams: Streams, name: str, make: MakeNumbers
+    link: LinkConfig, replay: Replay | None, streams: Streams, name: str, make: MakeNumbers
 ) -> tuple[Fate, ...]:
     """Return all chances that may take a packet of one direction."""
     fates: list[Fate] = [replay.takes] if replay else []
-    if way.loss:
+    if link.loss:
         uniforms = make(streams, f"{name}/loss")
-        bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", uniforms)
-        fates.append(bursts or chance(way.loss, uniforms))
+        bursts = link.bursts and link.bursts.play(link.loss, streams, f"{name}/bursts", uniforms)
+        fates.append(bursts or chance(link.loss, uniforms))
     return tuple(fates)
 
 
-def _make_wobble(way: LinkConfig, streams: Streams, name: str, make: MakeNumbers) -> Wobble | None:
+def _make_wobble(link: LinkConfig, streams: Streams, name: str, make: MakeNumbers) -> Wobble | None:
     """Return the random deviation of the delay of one direction, if it has any."""
-    if way.jitter_s:
-        width = way.jitter_s
+    if link.jitter_s:
+        width = link.jitter_s
         return by_quantile(lambda u: width * (2.0 * u - 1.0), make(streams, f"{name}/jitter"))
-    if way.law is not None:
-        return way.law.play(way.delay_s, streams, f"{name}/delay", make)
+    if link.law is not None:
+        return link.law.play(link.delay_s, streams, f"{name}/delay", make)
     return None
 
 
 def _make_replay(
-    way: LinkConfig, direction: Direction, streams: Streams, name: str
+    link: LinkConfig, direction: Direction, streams: Streams, name: str
 ) -> Replay | None:
     """Return one direction's part of a delay log; both directions play the same moment of it.
 
     A lost round trip is lost in one direction only, chosen at random.
     """
-    if way.delay_log is None:
+    if link.delay_log is None:
         return None
-    log = read_delay_log(way.delay_log)
+    log = read_delay_log(link.delay_log)
     rng = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
     offset = rng.random() * period_of(log)
     coins = rng.random(len(log.times))
-    share = way.delay_log_share
+    share = link.delay_log_share
     here = coins < share if direction == "up" else coins >= 1.0 - share
     return Replay(log, share, here, offset)
 
@@ -372,17 +372,17 @@ class RadioLink(Link):
     ) -> None:
         self._deviation = 0.0  # of the last packet, by the link's law
         super().__init__(config, serialiser, streams, name, direction)
-        way = config.toward(direction)
+        link = config.toward(direction)
         self._reception = reception
         self._uniforms = FastNoise(streams, f"{name}/radio")
-        self._air = ConstantRate(way.rate_bps)
-        self._air_room = way.queue_bytes
+        self._air = ConstantRate(link.rate_bps)
+        self._air_room = link.queue_bytes
         self._newest = 0.0
 
     @override
-    def _take(self, way: LinkConfig) -> None:
-        super()._take(way)
-        self._law = None if way.jitter_s else self._wobble
+    def _take(self, link: LinkConfig) -> None:
+        super()._take(link)
+        self._law = None if link.jitter_s else self._wobble
         if self._law is not None:
             self._wobble = self._noted
 

@@ -72,19 +72,19 @@ class Bottleneck:
             rate_bps=config.rate_bps,
             queue_bytes=config.queue_bytes,
         )
-        self._lines = {way: SharedLine(config.rate_bps) for way in WAYS}
+        self._lines = {direction: SharedLine(config.rate_bps) for direction in WAYS}
 
-    def link(self, flow: str, way: Direction, priority: bool = False) -> Link:
+    def link(self, flow: str, direction: Direction, priority: bool = False) -> Link:
         """Return the way of a flow over the link; it counts only what is the flow's own.
 
         Args:
             flow: Name of the flow, which selects its random stream.
             priority: True if the end hosts prefer its packets; matters in their queue only.
         """
-        line: Serialiser = self._lines[way]
+        line: Serialiser = self._lines[direction]
         if priority and self._config.place == "hosts":
-            line = Passing(self._lines[way], self._config.rate_bps)
-        return Link(self._link, line, self._streams, f"{flow}/{way}", way)
+            line = Passing(self._lines[direction], self._config.rate_bps)
+        return Link(self._link, line, self._streams, f"{flow}/{direction}", direction)
 
 
 class SharedLine(Serialiser):
@@ -310,7 +310,7 @@ def play(config: ContestConfig, seed: int) -> Contest:
     session = open_session(clock, config.transport, ends)
     bulk = _bulk(clock, config, bottleneck, streams)
     _feed(clock, config, session, (commands, pictures), streams)
-    links = {"session": [ends.up, ends.down]} | {way: bulk[way] for way in WAYS}
+    links = {"session": [ends.up, ends.down]} | {direction: bulk[direction] for direction in WAYS}
     clock.run(config.warm_up_s)
     before = {name: [link.bytes for link in some] for name, some in links.items()}
     until = config.warm_up_s + config.measure_s
@@ -326,7 +326,7 @@ def play(config: ContestConfig, seed: int) -> Contest:
         commands=commands,
         pictures=pictures,
         session_bytes=dict(zip(WAYS, took["session"], strict=True)),
-        bulk_bytes={way: took[way] for way in WAYS},
+        bulk_bytes={direction: took[direction] for direction in WAYS},
     )
 
 
@@ -334,15 +334,15 @@ def _bulk(
     clock: Clock, config: ContestConfig, bottleneck: Bottleneck, streams: Streams
 ) -> dict[Direction, list[Link]]:
     """Start the TCP flows at times of their own; the links that their data take."""
-    links: dict[Direction, list[Link]] = {way: [] for way in WAYS}
-    for way, count in zip(WAYS, (config.bulk.up, config.bulk.down), strict=True):
-        back: Direction = "down" if way == "up" else "up"
+    links: dict[Direction, list[Link]] = {direction: [] for direction in WAYS}
+    for direction, count in zip(WAYS, (config.bulk.up, config.bulk.down), strict=True):
+        back: Direction = "down" if direction == "up" else "up"
         for number in range(count):
-            name = f"bulk-{way}-{number}"
-            out = bottleneck.link(name, way)
+            name = f"bulk-{direction}-{number}"
+            out = bottleneck.link(name, direction)
             flow = Bulk(clock, out, bottleneck.link(name, back))
             clock.call_at(float(streams[name].uniform(0.0, 1.0)), flow.start)
-            links[way].append(out)
+            links[direction].append(out)
     return links
 
 

@@ -289,12 +289,12 @@ class TeamBuilder:
         scenario = self._stage.scenario
         site = self._stage.site
         if kind == "robot":
-            way = scenario.robot.way_m
+            distance = scenario.robot.way_m
             places = site.robot_bases
         else:
-            way = scenario.guard.way_m
+            distance = scenario.guard.way_m
             places = site.guard_posts
-        return places[number - 1] if way is None else self._away(f"{kind}-{number}", way)
+        return places[number - 1] if distance is None else self._away(f"{kind}-{number}", distance)
 
     def _away(self, label: str, length: float) -> Pose:
         """Return a place so far [m] from the event, looking along the way there."""
@@ -303,11 +303,11 @@ class TeamBuilder:
         goal = self._hazards.incidents[0].hazard.position
         longest = 0.0
         for _ in range(TRIES):
-            way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
-            if way is None:
+            path = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
+            if path is None:
                 continue
-            longest = max(longest, float(np.hypot(*np.diff(way, axis=0).T).sum()))
-            pose = _cut(way, length)
+            longest = max(longest, float(np.hypot(*np.diff(path, axis=0).T).sum()))
+            pose = _cut(path, length)
             if pose is not None and self._is_free(pose):
                 self._taken.append((pose.x, pose.y))
                 return pose
@@ -355,16 +355,16 @@ class Power:
         return battery.share
 
 
-def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
+def _cut(path: NDArray[np.float64], left: float) -> Pose | None:
     """Return the pose with so much of a path `(n, 2)` left [m]; None if it is shorter."""
-    steps = np.hypot(*np.diff(way, axis=0).T)
+    steps = np.hypot(*np.diff(path, axis=0).T)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     at = float(gone[-1]) - left
     if at < 0.0:
         return None
     place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
-    x, y = way[place]
-    ahead = way[place + 1] - way[place]
+    x, y = path[place]
+    ahead = path[place + 1] - path[place]
     share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
     heading = math.atan2(ahead[1], ahead[0])
     return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)

@@ -49,14 +49,18 @@ from dva_sim.simulation.transports import SessionRecording
 _WHERE: dict[Direction, str] = {"up": "towards the robot", "down": "from the robot"}
 
 
-def _of_way(way: Direction) -> tuple[Measure, ...]:
-    where = _WHERE[way]
+def _of_way(direction: Direction) -> tuple[Measure, ...]:
+    where = _WHERE[direction]
     return (
-        Measure(f"bulk_use_{way}", f"share of the line that TCP flows get {where}", low=0, high=1),
-        Measure(f"jain_{way}", f"Jain's index of all rates {where}", better="large", low=0, high=1),
-        Measure(f"share_of_fair_{way}", f"session's rate over a fair one, {where}", low=0),
-        Measure(f"session_{way}_bps", f"rate of the session {where}"),
-        Measure(f"bulk_{way}_bps", f"mean rate of a TCP flow {where}"),
+        Measure(
+            f"bulk_use_{direction}", f"share of the line that TCP flows get {where}", low=0, high=1
+        ),
+        Measure(
+            f"jain_{direction}", f"Jain's index of all rates {where}", better="large", low=0, high=1
+        ),
+        Measure(f"share_of_fair_{direction}", f"session's rate over a fair one, {where}", low=0),
+        Measure(f"session_{direction}_bps", f"rate of the session {where}"),
+        Measure(f"bulk_{direction}_bps", f"mean rate of a TCP flow {where}"),
     )
 
 
@@ -115,18 +119,18 @@ def contest_row(config: ContestConfig, contest: Contest) -> Row:
     row = _command_row(contest, *commands) | _picture_row(contest, *pictures)
     trips = round_trips(commands[0], commands[1], pictures[0], pictures[1])
     row |= {"round_trip_mean_s": mean(trips), "round_trip_p95_s": percentile(trips, 95)}
-    for way in WAYS:
+    for direction in WAYS:
         per_byte = 8.0 / (contest.until - contest.since)
         line = config.bottleneck.rate_bps
-        session = contest.session_bytes[way] * per_byte
-        bulk = [took * per_byte for took in contest.bulk_bytes[way]]
+        session = contest.session_bytes[direction] * per_byte
+        bulk = [took * per_byte for took in contest.bulk_bytes[direction]]
         fair = line / (1 + len(bulk))
         row |= {
-            f"session_{way}_bps": session,
-            f"bulk_{way}_bps": mean(bulk),
-            f"bulk_use_{way}": sum(bulk) / line if bulk else math.nan,
-            f"jain_{way}": jain([session, *bulk]) if bulk else math.nan,
-            f"share_of_fair_{way}": session / fair if bulk else math.nan,
+            f"session_{direction}_bps": session,
+            f"bulk_{direction}_bps": mean(bulk),
+            f"bulk_use_{direction}": sum(bulk) / line if bulk else math.nan,
+            f"jain_{direction}": jain([session, *bulk]) if bulk else math.nan,
+            f"share_of_fair_{direction}": session / fair if bulk else math.nan,
         }
     return row
 
@@ -135,11 +139,12 @@ def flow_rows(contest: Contest) -> list[Row]:
     """Return the rate of each flow in each direction [bit/s]."""
     per_byte = 8.0 / (contest.until - contest.since)
     rows = []
-    for way in WAYS:
-        rates = {"session": contest.session_bytes[way]}
-        rates |= {f"bulk {n + 1}": took for n, took in enumerate(contest.bulk_bytes[way])}
+    for direction in WAYS:
+        rates = {"session": contest.session_bytes[direction]}
+        rates |= {f"bulk {n + 1}": took for n, took in enumerate(contest.bulk_bytes[direction])}
         rows += [
-            {"way": way, "flow": flow, "rate_bps": took * per_byte} for flow, took in rates.items()
+            {"way": direction, "flow": flow, "rate_bps": took * per_byte}
+            for flow, took in rates.items()
         ]
     return rows
 

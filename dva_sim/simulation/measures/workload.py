@@ -233,9 +233,9 @@ def off_the_way(log: DriveLog, track: Iterable[TrackPoint], end: float) -> Float
     ways = [shapely.linestrings(points) if len(points) > 1 else None for _, points in log.ways]
     gaps = []
     for point in filter(_is_sample, track):
-        way = ways[max(int(np.searchsorted(starts, point.time, side="right")) - 1, 0)]
-        if starts[0] <= point.time <= until and way is not None:
-            gaps.append(float(shapely.distance(way, shapely.points(point.x, point.y))))
+        path = ways[max(int(np.searchsorted(starts, point.time, side="right")) - 1, 0)]
+        if starts[0] <= point.time <= until and path is not None:
+            gaps.append(float(shapely.distance(path, shapely.points(point.x, point.y))))
     return np.array(gaps)
 
 

@@ -52,7 +52,7 @@ def command_needs_s(scenario: Scenario) -> float:
 
 def round_trip_s(link: LinkConfig) -> float:
     """Mean delay of a link there and back, without queues and losses [s]."""
-    return sum(link.toward(way).delay_s for way in ("up", "down"))
+    return sum(link.toward(direction).delay_s for direction in ("up", "down"))
 
 
 def mean_processing_s(scenario: Scenario) -> float:

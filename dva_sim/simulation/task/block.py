@@ -264,8 +264,8 @@ def _goal(
     first, second = condition
     if isinstance(task, Pointing):
         angle = 0.0 if task.axes == 1 else number * (math.pi + math.pi / task.targets)
-        way = Wandering(task, first, angle, streams.fresh("target"))
-        return PointGoal(task, way, second, person.hand_lag + scenario.link.up.delay_s)
+        target = Wandering(task, first, angle, streams.fresh("target"))
+        return PointGoal(task, target, second, person.hand_lag + scenario.link.up.delay_s)
     if isinstance(task, Tunnel):
         return TunnelGoal(task, first, second)
     if isinstance(task, Tracking):

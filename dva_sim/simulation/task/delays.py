@@ -31,12 +31,12 @@ class Channel(Generic[T]):
         name: Name of this direction, which selects its random stream.
     """
 
-    def __init__(self, way: OneWayDelay, extra: float, streams: Streams, name: str) -> None:
-        config = way.link()
+    def __init__(self, delay: OneWayDelay, extra: float, streams: Streams, name: str) -> None:
+        config = delay.link()
         self._link = Link(config, make_serialiser(config, "up", streams, name), streams, name)
-        self._is_plain = not way.jitter_s and not way.loss
+        self._is_plain = not delay.jitter_s and not delay.loss
         self._extra = extra
-        self._delay = way.delay_s + extra
+        self._delay = delay.delay_s + extra
         self._queue: deque[tuple[float, T]] = deque()
 
     def put(self, now: float, item: T) -> None:

@@ -103,15 +103,15 @@ class PointGoal(ToTarget):
         press: Time from the decision to press a button to the press at the machine [s].
     """
 
-    def __init__(self, task: Pointing, way: Wandering, width: float, press: float) -> None:
+    def __init__(self, task: Pointing, target: Wandering, width: float, press: float) -> None:
         self._task = task
-        self._way = way
+        self._way = target
         self.width = width
-        self.amplitude = way.amplitude
+        self.amplitude = target.amplitude
         self.flat = task.axes == 1
         self.is_stationary = not task.target_mps
         self.tolerance = 0.5 * (width - task.cursor_m)
-        self.edge = way.edge
+        self.edge = target.edge
         self._press = press
         self._pressed_at = math.inf
         self._presses = 0

@@ -280,9 +280,9 @@ class ReachTask(Config):
     def conditions(self) -> Iterator[tuple[float, float]]:
         """Yield the whole way and width of a target [m] of each condition."""
         places = [(0.0, 0.0), *((stop.swing_m, stop.reach_m) for stop in self.stops)]
-        way = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
+        distance = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
         for tolerance in values_of(self.tolerance_m):
-            yield way, 2.0 * tolerance
+            yield distance, 2.0 * tolerance
 
 
 Task = Annotated[

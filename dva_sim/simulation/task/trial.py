@@ -189,8 +189,8 @@ class Trial(ABC, Generic[S]):
         self._newest: S | None = None
         self._late = scenario.frames.extra_s + perception
         self._frames: Channel[S] = Channel(scenario.link.down, self._late, streams, "down")
-        way = OneWayDelay() if self.is_oracle else scenario.link.up
-        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
+        delay = OneWayDelay() if self.is_oracle else scenario.link.up
+        self._up: Channel[Pair] = Channel(delay, 0.0, streams, "up")
 
     @abstractmethod
     def sight(self) -> S:

@@ -75,7 +75,7 @@ def travel(
         if drawn:
             trips = [shift.trip(u, at, goal) for u, at in zip(units, places, strict=True)]
         else:
-            trips = [way / u.group.speed_mps for u, way in zip(units, ways, strict=True)]
+            trips = [distance / u.group.speed_mps for u, distance in zip(units, ways, strict=True)]
         lengths.append(ways)
         etas.append([a + b for a, b in zip(ready, trips, strict=True)])
     shape = len(goals), len(starts)

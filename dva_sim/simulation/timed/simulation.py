@@ -381,12 +381,12 @@ class Shift:
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
         """Time to get somewhere [s]; infinite if no path exists."""
-        way = self.scenario.way
-        if isinstance(way, str):
+        law = self.scenario.way
+        if isinstance(law, str):
             return self.terrain.length(start, goal) / unit.speed
         if goal.about is None:
             return 0.0  # back
-        return self._drawn("travel", way, goal.about, unit.name)
+        return self._drawn("travel", law, goal.about, unit.name)
 
     def look(self, unit: Unit, incident: Incident) -> float:
         """Time from arrival to certainty [s]; random by event, the same for every responder."""

@@ -376,14 +376,14 @@ class Rooms(Terrain):
     placed = True
 
     def __init__(
-        self, name: str, spots: int, way: Literal["none", "straight", "path"] | Law
+        self, name: str, spots: int, travel: Literal["none", "straight", "path"] | Law
     ) -> None:
         self.site = load_site(name)
         if not self.site.rooms:
             raise ConfigError(f"site {name!r} has no rooms: events need them")
         super().__init__([room.name for room in self.site.rooms], self.site.frame, PLACE_STEP_DEG)
         self._ways = _ways_of(self.site)
-        self._way = way
+        self._way = travel
         self._spots = [
             [self.fix(x, y, zone) for x, y in points]
             for zone, points in enumerate(_spots_of(self.site, spots))

@@ -293,11 +293,11 @@ def sqm(
         O. Berman, R. C. Larson & S. S. Chiu, Optimal server location on a network operating
         as an M/G/1 queue, Oper. Res. 33 (1985) 746-771 (the stochastic queue median).
     """
-    way = CENTRE * side_m / speed_mps
+    travel_s = CENTRE * side_m / speed_mps
     square = side_m**2 / 6 / speed_mps**2
-    second = 4 * square + 4 * way * service.mean + service.second
-    measures = mg1(arrival_rate, LawMoments(2 * way + service.mean, second))
-    return measures | {"travel_s": way, "response_s": measures["wait_s"] + way}
+    second = 4 * square + 4 * travel_s * service.mean + service.second
+    measures = mg1(arrival_rate, LawMoments(2 * travel_s + service.mean, second))
+    return measures | {"travel_s": travel_s, "response_s": measures["wait_s"] + travel_s}
 
 
 def _mean_nearest(x: float, y: float, places: int, nodes: Floats, weights: Floats) -> float:

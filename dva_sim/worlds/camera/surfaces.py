@@ -197,7 +197,7 @@ def _sides_of_solids(site: Site, walls: NDArray[np.float64]) -> NDArray[np.bool_
 
 def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
     """Return doors and exits: ends x1, y1, x2, y2, shape `(n, 4)` [m], and heights `(n,)` [m]."""
-    exits = [way.ends for way in site.exits]
+    exits = [exit_.ends for exit_ in site.exits]
     ends = np.vstack([np.reshape(site.doors, (-1, 4)), np.reshape(exits, (-1, 4))])
     heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
     return ends, np.array([*heights, *(DOOR_HEIGHT for _ in exits)], dtype=np.float32)

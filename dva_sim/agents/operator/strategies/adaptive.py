@@ -197,10 +197,10 @@ class Adaptive(Strategy):
         """Return the factor by which acting on such a late picture seems worse than it is."""
         return delay / (self._habits.driven * self.person.waits_from)
 
-    def _waiting(self, way: float, moves: float, delay: float) -> float:
+    def _waiting(self, distance: float, moves: float, delay: float) -> float:
         """Return the expected time to finish in a number of moves, each with its wait [s]."""
         a_move = max(self._habits.shortest_s, self.period.value)
-        return way / self._most + moves * (a_move + self._moves.moves.usual_wait(delay))
+        return distance / self._most + moves * (a_move + self._moves.moves.usual_wait(delay))
 
     def _choose(self, now: float, liking: float) -> None:
         """Move and wait if the person likes that better; change back only between two moves."""

@@ -131,10 +131,10 @@ def straight_way(route: Route, here: Pair, along: float, most: float, slack: flo
         most: [m]
         slack: Largest distance of the route from the straight line [m].
     """
-    way = most
-    while way > 2.0 * slack and _apart(route, here, along, way) > slack:
-        way *= 0.7
-    return way
+    length = most
+    while length > 2.0 * slack and _apart(route, here, along, length) > slack:
+        length *= 0.7
+    return length
 
 
 def _apart(route: Route, here: Pair, along: float, way: float) -> float:
@@ -208,9 +208,9 @@ class MoveAndWait(Strategy):
             return 0.0, 0.0
         along = path.length - left
         room = self.person.caution * seen.tolerance
-        way = min(self.trusted_in(seen.tolerance), left)
-        way = straight_way(path, (seen.x, seen.y), along, way, room)
-        x, y = path.point_at(along + way)
+        length = min(self.trusted_in(seen.tolerance), left)
+        length = straight_way(path, (seen.x, seen.y), along, length, room)
+        x, y = path.point_at(along + length)
         return self._straight(view.now, x - seen.x, y - seen.y)
 
     def workload(self) -> Mapping[str, float]:
@@ -239,8 +239,8 @@ class MoveAndWait(Strategy):
         go = left - stop_before
         habits = self._habits
         most = max(min(self.trusted, go), habits.least_m)
-        way = straight_way(route, here, route.length - left, most, habits.off_way_m)
-        ahead = route.ahead(*here, seen.heading, max(way, stop_before if go <= 0.0 else 0.0))
+        length = straight_way(route, here, route.length - left, most, habits.off_way_m)
+        ahead = route.ahead(*here, seen.heading, max(length, stop_before if go <= 0.0 else 0.0))
         turns = turns and abs(ahead.bearing) > habits.faces_rad
         if go <= 0.0:
             return [self._turn(ahead.bearing)] if turns else []
@@ -274,12 +274,12 @@ class MoveAndWait(Strategy):
         vy = dy / lasts
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
-    def _lasting(self, way: float, most: float) -> float:
+    def _lasting(self, length: float, most: float) -> float:
         """Return how long a move, or a turn, takes at this speed [s].
 
         Moves shorter than the period may be lost, and a command lasts for whole periods.
         """
-        lasts = max(way / most, self._habits.shortest_s)
+        lasts = max(length / most, self._habits.shortest_s)
         period = self.period
         if period <= self._habits.shortest_s:
             return lasts

@@ -77,8 +77,8 @@ class EndingsInTime(style.ReportFigure):
             ax.set_xlabel("Since the report [s]")
         key(
             figure,
-            [box(FATES[way]) for way in endings.ways],
-            ["nothing yet" if way == NOTHING else way for way in endings.ways],
+            [box(FATES[ending]) for ending in endings.ways],
+            ["nothing yet" if ending == NOTHING else ending for ending in endings.ways],
         )
         words = caption("endings", part=view.part.name, place=brief(view.panels[0]))
         return self.finish(figure, words, numbers)
@@ -92,10 +92,10 @@ def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level])
 def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[str, Floats]:
     """Cumulative incidence of each way at some times, and the share to which nothing happened."""
     ways = endings.ways[:-1]
-    codes = {way: number for number, way in enumerate(ways, 1)}
-    causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
+    codes = {ending: number for number, ending in enumerate(ways, 1)}
+    causes = np.array([codes.get(ending, CUT) for ending in endings.way[mask]], dtype=np.intp)
     curve = incidence(endings.time[mask], causes, len(ways))
-    shares = {way: curve.at(times, code) for code, way in enumerate(ways, 1)}
+    shares = {ending: curve.at(times, code) for code, ending in enumerate(ways, 1)}
     return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
 
 
@@ -104,8 +104,8 @@ def stack_in_time(
 ) -> None:
     """Stack shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
-    for way, share in shares.items():
-        fill = fills[way]
+    for ending, share in shares.items():
+        fill = fills[ending]
         top = floor + share
         look: dict[str, Any] = {"facecolor": fill.colour, "hatch": fill.hatch, "edgecolor": PAPER}
         ax.fill_between(times, floor, top, step="post", lw=0.6, **look)

@@ -36,12 +36,12 @@ def draw_screening(study: Study, screening: Screening, folder: Path) -> Iterator
     still = sum(each.size == 0.0 for _, each in screening.numbers)
     yield f"{still} of the numbers do not move it at all. Those that move it most:"
     for number, each in most:
-        way = "up" if each.mean.mean > 0 else "down"
+        direction = "up" if each.mean.mean > 0 else "down"
         sure = each.mean.low > 0 or each.mean.high < 0
         certainty = "" if sure else " (which way is not certain)"
         yield (
             f"  {number.key} from {_band(number)}: by {each.size:.3g} {unit} either way, "
-            f"{way} by {abs(each.mean.mean):.3g} {unit} on average{certainty}"
+            f"{direction} by {abs(each.mean.mean):.3g} {unit} on average{certainty}"
         )
     yield f"Figure: {folder / FIGURE}"
 

@@ -58,14 +58,14 @@ def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
     points = [*trace.places, *((x, y) for x, y, _ in trace.marks)]
     unit = LengthUnit("mm", 1000.0) if np.ptp(points, axis=0).max() < 1.0 else LengthUnit("m", 1.0)
     with styled():
-        figure, ((way, speed),) = panels(1, 2, 3.8)
+        figure, ((path, speed),) = panels(1, 2, 3.8)
         _speed(speed, trace, unit)
         _mark_timed(speed, row)
         if any(y for _, y in trace.places):
-            _way(way, trace, unit, scenario)
+            _way(path, trace, unit, scenario)
         else:
-            _place(way, trace, unit)
-            speed.set_xlim(way.get_xlim())
+            _place(path, trace, unit)
+            speed.set_xlim(path.get_xlim())
         figure.suptitle(_title(scenario, row), x=0.01, ha="left", fontsize=9.5, color=INK)
     return figure
 

@@ -218,9 +218,9 @@ class EmulatedCell:
         way: Way in which this process got the right to make namespaces.
     """
 
-    def __init__(self, job: EmulatedJob, way: str) -> None:
+    def __init__(self, job: EmulatedJob, link_kind: str) -> None:
         self._job = job
-        self._way = way
+        self._way = link_kind
         self._nodes: list[Node] = []
         self._links = links_of(job.wire, job.seed)
 
@@ -278,10 +278,10 @@ class EmulatedCell:
 def columns_of(report: LinkReport) -> LinkColumns:
     """Return the columns of the emulator, by the letters of both ends: a is the operator."""
     columns: LinkColumns = {}
-    for way, flow in (("ab", report.up), ("ba", report.down)):
-        columns[f"emu_pkts_{way}"] = flow.offered_packets
-        columns[f"emu_lost_{way}"] = flow.lost_by_chance
-        columns[f"emu_tail_{way}"] = flow.lost_in_queue
+    for direction, flow in (("ab", report.up), ("ba", report.down)):
+        columns[f"emu_pkts_{direction}"] = flow.offered_packets
+        columns[f"emu_lost_{direction}"] = flow.lost_by_chance
+        columns[f"emu_tail_{direction}"] = flow.lost_in_queue
     for name in ("p50", "p99", "max"):
         columns[f"emu_late_{name}_ms"] = 1e3 * float(getattr(report, f"late_{name}_s"))
     return columns

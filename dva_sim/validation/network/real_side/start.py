@@ -21,11 +21,11 @@ def main() -> None:
     line = sys.stdin.readline()
     job = json.loads(line)
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
-    way = job["link"]
+    link_kind = job["link"]
     problem = ""
-    if way != "proxy":
+    if link_kind != "proxy":
         try:
-            way = become_owner(job["rootless"])
+            link_kind = become_owner(job["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
     die_with_parent(int(sys.argv[1]))
@@ -39,7 +39,7 @@ def main() -> None:
     outcome = (
         EmulatedOutcome(problem=problem)
         if problem
-        else EmulatedCell(EmulatedJob.from_json(line), way).play()
+        else EmulatedCell(EmulatedJob.from_json(line), link_kind).play()
     )
     print(outcome.to_json(), flush=True)
 
