@@ -325,9 +325,9 @@ def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
             _check_place("station", piece.station, stations)
 
 
-def _check_place(what: str, place: object, count: int) -> None:
-    if isinstance(place, bool) or not 0 <= operator.index(place) < count:  # type: ignore[arg-type]
-        raise IndexError(f"there is no {what} {place!r}; there are {count}")
+def _check_place(what: str, index: object, count: int) -> None:
+    if isinstance(index, bool) or not 0 <= operator.index(index) < count:  # type: ignore[arg-type]
+        raise IndexError(f"there is no {what} {index!r}; there are {count}")
 
 
 REST = 10.0  # a robot has stood idle for so long before it sets out [s]

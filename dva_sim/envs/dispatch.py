@@ -247,9 +247,9 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         self._mask[first : first + self._stations] = 0
 
     def _bar_idle_robots(self, situation: Situation) -> None:
-        for place, responder in zip(self._places, situation.responders, strict=True):
+        for index, responder in zip(self._places, situation.responders, strict=True):
             if responder.kind == "robot" and responder.engaged is None:
-                self._mask[1 + place : self._announcements : self._units] = 0
+                self._mask[1 + index : self._announcements : self._units] = 0
 
     # --- a decision ----------------------------------------------------------------------
 
@@ -286,9 +286,9 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if self._stations and situation.cover is not None:
             moves = self._mask[self._moves :].reshape(self._units, self._stations)
             moves[self._places] = np.isfinite(situation.cover.eta)
-            for place, bound in zip(self._places, situation.cover.bound_for, strict=True):
+            for index, bound in zip(self._places, situation.cover.bound_for, strict=True):
                 if bound is not None:
-                    moves[place, bound] = 0
+                    moves[index, bound] = 0
 
     def _running(self) -> SteppedShift:
         if self._shift is None:
@@ -343,8 +343,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                 max(0.0, now - task.waiting_since),
                 task.engaged is not None,
             )
-        for place, responder in zip(self._places, situation.responders, strict=True):
-            seen["units"][place] = 1.0, responder.kind == "robot", responder.engaged is not None
+        for index, responder in zip(self._places, situation.responders, strict=True):
+            seen["units"][index] = 1.0, responder.kind == "robot", responder.engaged is not None
         seen["operators"][0] = self._operators
         rows = slice(len(tasks))
         for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):
@@ -356,9 +356,9 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if self._stations and situation.cover is not None:
             seen["cover_s"][:] = NO_END
             seen["cover_s"][self._places] = _bounded(situation.cover.eta)
-            for place, bound in zip(self._places, situation.cover.bound_for, strict=True):
+            for index, bound in zip(self._places, situation.cover.bound_for, strict=True):
                 if bound is not None:
-                    seen["bound_for"][place, bound] = 1.0
+                    seen["bound_for"][index, bound] = 1.0
 
     def _reward(self) -> float:
         """Return minus the minutes that events have waited since this was asked last."""

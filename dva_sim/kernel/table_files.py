@@ -35,9 +35,9 @@ class Cell:
         """Content of the cell."""
         return self.row[self.place].strip()
 
-    def at(self, place: int) -> Cell:
+    def at(self, column: int) -> Cell:
         """Return another cell of the row."""
-        return Cell(self.table, self.line, self.row, place)
+        return Cell(self.table, self.line, self.row, column)
 
     @property
     def decimal(self) -> str:
@@ -97,9 +97,9 @@ class CsvTable:
         for line, row in self.rows:
             yield Cell(self, line, row)
 
-    def error(self, problem: str, place: int) -> ConfigError:
+    def error(self, problem: str, column: int) -> ConfigError:
         """Return a mistake at a name of the header."""
-        return Cell(self, self.line, self.names, place).error(problem)
+        return Cell(self, self.line, self.names, column).error(problem)
 
 
 @read_once(lambda path: [Path(path)])

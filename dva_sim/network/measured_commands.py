@@ -54,8 +54,8 @@ def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
         raise ConfigError(f"times should be numbers: {error}", path) from None
     runs = groups.get(tuple(map(str, where.values())))
     if runs is None:
-        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
-        raise ConfigError(f"of {place}, no command was measured", path)
+        condition = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
+        raise ConfigError(f"of {condition}, no command was measured", path)
     return runs
 
 

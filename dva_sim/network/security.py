@@ -132,8 +132,8 @@ class Refusal:
 
     def __str__(self) -> str:
         if self.peer is None:
-            place = f" at {self.endpoint}" if self.endpoint else ""
-            return f"{self.device}{place} refused a connection: {self.why}"
+            endpoint = f" at {self.endpoint}" if self.endpoint else ""
+            return f"{self.device}{endpoint} refused a connection: {self.why}"
         return f"{self.device}: handshake with {self.peer} at {self.endpoint} failed: {self.why}"
 
     @property

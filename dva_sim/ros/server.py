@@ -124,17 +124,17 @@ class RosbridgeServer:
             return
         with suppress(OSError):
             sock, _ = self._listener.accept()
-            place = self._places.enter(self._clock.now)
+            slot = self._places.enter(self._clock.now)
             protocol = ServerProtocol(max_size=LARGEST)
             connection = WebSocketConnection(
                 self._clock,
                 sock,
                 protocol,
                 lambda data: self._take(connection, data),
-                lambda why: self._ended(connection, place, why),
+                lambda why: self._ended(connection, slot, why),
             )
-            place.drop = lambda: connection.end("its place was needed, or it showed no token")
-            connection.on_event = lambda event: self._greet(connection, place, protocol, event)
+            slot.drop = lambda: connection.end("its place was needed, or it showed no token")
+            connection.on_event = lambda event: self._greet(connection, slot, protocol, event)
             self._peers[connection] = None
 
     def _ping(self) -> None:
@@ -146,7 +146,7 @@ class RosbridgeServer:
                 connection.ping()
 
     def _greet(
-        self, connection: WebSocketConnection, place: PortConnection, protocol: Any, request: Any
+        self, connection: WebSocketConnection, slot: PortConnection, protocol: Any, request: Any
     ) -> None:
         """Answer the opening handshake."""
         if protocol.handshake_exc is not None:
@@ -162,14 +162,14 @@ class RosbridgeServer:
             self._count += 1
             name = f"ROS client {self._count}"
             self._peers[connection] = peer = RosPeer(name, connection, self)
-            self._admit(peer, place)
+            self._admit(peer, slot)
 
-    def _admit(self, peer: RosPeer, place: PortConnection) -> None:
+    def _admit(self, peer: RosPeer, slot: PortConnection) -> None:
         """Give a client with a token its rank; those beyond the limit may still stop robots."""
         others = [each for each in self._peers.values() if each is not None and each is not peer]
         peer.only_stops = sum(not each.only_stops for each in others) >= MAX_PEERS
         rank = STOPS if peer.only_stops else DOES_ALL
-        place.begin(rank, self._clock.now, is_limited=not peer.only_stops)
+        slot.begin(rank, self._clock.now, is_limited=not peer.only_stops)
         self.tell(f"{peer.name} has come{', and may only stop robots' if peer.only_stops else ''}")
 
     def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
@@ -189,8 +189,8 @@ class RosbridgeServer:
         if peer is not None:
             peer.take(data)
 
-    def _ended(self, connection: WebSocketConnection, place: PortConnection, why: str) -> None:
-        place.leave()
+    def _ended(self, connection: WebSocketConnection, slot: PortConnection, why: str) -> None:
+        slot.leave()
         peer = self._peers.pop(connection, None)
         if peer is None:
             return

@@ -33,15 +33,15 @@ class HttpProtocol(H11Protocol):
         is_made: True once the connection belongs to the protocol, and no longer to the listener.
     """
 
-    def __init__(self, place: PortConnection, **options: Any) -> None:
+    def __init__(self, slot: PortConnection, **options: Any) -> None:
         super().__init__(**options)
-        self._place = place
+        self._place = slot
         self.is_made = False
         self._is_lost = False
-        self.app = extended(self.app, {PLACE: place, WIRE: self})
+        self.app = extended(self.app, {PLACE: slot, WIRE: self})
         kind: Any = self.ws_protocol_class
         if kind is not None:
-            self.ws_protocol_class = partial(kind, place)  # type: ignore[assignment]
+            self.ws_protocol_class = partial(kind, slot)  # type: ignore[assignment]
 
     @property
     def waiting(self) -> int:
@@ -99,8 +99,8 @@ def extended(app: Any, more: dict[str, Any]) -> ASGIApp:
 
 def place_of(scope: Scope) -> PortConnection:
     """Return the place of the connection under a request."""
-    place: PortConnection = scope["extensions"][PLACE]
-    return place
+    slot: PortConnection = scope["extensions"][PLACE]
+    return slot
 
 
 def wire_of(scope: Scope) -> Any:

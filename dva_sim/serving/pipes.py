@@ -223,13 +223,13 @@ class LineOutbox:
         """Add a line; `key` tells lines of one kind apart of which only the newest counts."""
         kind = str(line.get("k"))
         self._number += 1
-        place = (kind, key) if kind in self._kinds.newest else self._number
-        if self._waiting.pop(place, None) is not None:
+        key_of_line = (kind, key) if kind in self._kinds.newest else self._number
+        if self._waiting.pop(key_of_line, None) is not None:
             self.dropped += 1
         elif len(self._waiting) >= MAX_WAITING:
             self._drop_one()
         data = json.dumps(line, separators=(",", ":"), ensure_ascii=False).encode() + b"\n"
-        self._waiting[place] = kind, data
+        self._waiting[key_of_line] = kind, data
 
     def next(self) -> bytes | None:
         """Take the oldest out."""
@@ -238,8 +238,8 @@ class LineOutbox:
     def _drop_one(self) -> None:
         lost = [p for p, (kind, _) in self._waiting.items() if kind not in self._kinds.kept]
         first = [p for p in lost if self._waiting[p][0] in self._kinds.first_dropped]
-        for place in (first or lost)[:1]:
-            del self._waiting[place]
+        for key_of_line in (first or lost)[:1]:
+            del self._waiting[key_of_line]
             self.dropped += 1
 
 

@@ -98,46 +98,46 @@ class PortConnections:
         """Return the place of a new connection; if all are taken, another connection is cut."""
         if len(self.taken) >= self._most:
             self._drop(self._least(), "for a newcomer")
-        place = PortConnection(self, now, now)
-        self.taken[place] = None
-        return place
+        slot = PortConnection(self, now, now)
+        self.taken[slot] = None
+        return slot
 
-    def bear(self, place: PortConnection) -> bool:
+    def bear(self, slot: PortConnection) -> bool:
         """Return whether a request may be served; a lower rank's connection may be cut for it."""
         served = [each for each in self.taken if each.is_served]
         if len(served) <= self._most_served:
             return True
         least = min(served, key=_importance)
-        if least.rank >= place.rank:
+        if least.rank >= slot.rank:
             return False
         self._drop(least, "for a higher rank")
         return True
 
     def sweep(self, now: float) -> None:
         """Cut the connections that have been silent for too long."""
-        for place in list(self.taken):
-            if not place.is_served and now - place.since > (IDLE if place.rank else SILENT):
-                self._drop(place, "silent")
+        for slot in list(self.taken):
+            if not slot.is_served and now - slot.since > (IDLE if slot.rank else SILENT):
+                self._drop(slot, "silent")
 
     def _least(self) -> PortConnection:
         """Return the connection that makes room first."""
-        shaken = [place for place in self.taken if place.rank > 0]
+        shaken = [slot for slot in self.taken if slot.rank > 0]
         # Newcomers show their token in their first request, so some places are always theirs.
         full = shaken if len(shaken) > self._most_served else ()
         return min(full or self.taken, key=_importance)
 
-    def _drop(self, place: PortConnection, why: str) -> None:
-        place.leave()
+    def _drop(self, slot: PortConnection, why: str) -> None:
+        slot.leave()
         self.dropped[why] += 1
         try:
-            place.drop()
+            slot.drop()
         except Exception:  # one connection that cannot be cut must not keep the others
             _LOG.exception("a connection could not be cut")
 
 
-def _importance(place: PortConnection) -> tuple[bool, int, float]:
+def _importance(slot: PortConnection) -> tuple[bool, int, float]:
     """Requests with a token come first, then the rank; of the others the newest matter most.
 
     Without a token no request makes a connection newer: it would keep its place for ever.
     """
-    return place.is_served, place.rank, place.since if place.rank else place.made
+    return slot.is_served, slot.rank, slot.since if slot.rank else slot.made

@@ -30,12 +30,12 @@ class PortGuard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        place = place_of(scope)
+        slot = place_of(scope)
         headers = HTTPConnection(scope).headers
         query = scope["query_string"].decode("latin-1")
         bearer = headers.get("authorization", "")
         refusal = self._admission.refusal(facts_of(scope, is_page=True), query, bearer)
-        if not place.begin(0 if refusal else CLIENT, time.monotonic()):
+        if not slot.begin(0 if refusal else CLIENT, time.monotonic()):
             refusal = 503, "too many connections are in use"
         try:
             if refusal is None:
@@ -48,7 +48,7 @@ class PortGuard:
             else:
                 await WebSocket(scope, receive, send).send_denial_response(answer)
         finally:
-            place.end(time.monotonic())
+            slot.end(time.monotonic())
 
 
 def facts_of(scope: Scope, *, is_page: bool) -> RequestFacts:

@@ -83,9 +83,9 @@ class PortListener:
         finally:
             loop.remove_reader(self._sock)
             self._sock.close()
-            for place in list(self._places.taken):
-                if not place.is_served:
-                    place.drop()
+            for slot in list(self._places.taken):
+                if not slot.is_served:
+                    slot.drop()
 
     def _accept(self) -> None:
         for _ in range(ACCEPTS_PER_TURN):
@@ -100,31 +100,31 @@ class PortListener:
             except OSError:  # no file is left, here or in the whole system
                 self._pause(PAUSE)
                 return
-            place = self._places.enter(time.monotonic())
-            place.drop = partial(self._close, connection)
-            asyncio.get_running_loop().add_reader(connection, self._heard, connection, place)
+            slot = self._places.enter(time.monotonic())
+            slot.drop = partial(self._close, connection)
+            asyncio.get_running_loop().add_reader(connection, self._heard, connection, slot)
 
     def _close(self, connection: socket.socket) -> None:
         asyncio.get_running_loop().remove_reader(connection)
         connection.close()
 
-    def _heard(self, connection: socket.socket, place: PortConnection) -> None:
+    def _heard(self, connection: socket.socket, slot: PortConnection) -> None:
         """Note the first word of a connection."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(connection)
         if not self._speaking:
             loop.call_soon(self._serve_some)
-        self._speaking.append((connection, place))
+        self._speaking.append((connection, slot))
 
     def _serve_some(self) -> None:
         served = 0
         while self._speaking and served < self._at_once:
-            connection, place = self._speaking.pop()  # the newest: older ones may be cut meanwhile
-            if place in self._places.taken:
+            connection, slot = self._speaking.pop()  # the newest: older ones may be cut meanwhile
+            if slot in self._places.taken:
                 served += 1
-                place.since = time.monotonic()
-                task = asyncio.ensure_future(self._connect(connection, place))
-                place.drop = task.cancel
+                slot.since = time.monotonic()
+                task = asyncio.ensure_future(self._connect(connection, slot))
+                slot.drop = task.cancel
                 self._connecting.add(task)
                 task.add_done_callback(self._connecting.discard)
         if self._speaking:
@@ -139,16 +139,16 @@ class PortListener:
         if self._sock.fileno() >= 0:
             asyncio.get_running_loop().add_reader(self._sock, self._accept)
 
-    async def _connect(self, connection: socket.socket, place: PortConnection) -> None:
+    async def _connect(self, connection: socket.socket, slot: PortConnection) -> None:
         """Shake hands, where that is needed; the protocol serves the connection from then on."""
         within = {} if self._context is None else _TLS
-        protocol = self._make(place)
+        protocol = self._make(slot)
         try:
             await asyncio.get_running_loop().connect_accepted_socket(
                 lambda: protocol, connection, ssl=self._context, **within
             )
         except (OSError, asyncio.CancelledError):
-            place.leave()
+            slot.leave()
             if protocol.is_made:
                 protocol.cut()  # its transport closes the file, whose number may be used again
             else:

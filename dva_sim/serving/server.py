@@ -46,9 +46,9 @@ class Server(uvicorn.Server):
         )
         return cls(config)
 
-    def protocol(self, place: PortConnection) -> HttpProtocol:
+    def protocol(self, slot: PortConnection) -> HttpProtocol:
         """Return what serves a connection."""
-        return HttpProtocol(place, config=self.config, server_state=self.server_state, app_state={})
+        return HttpProtocol(slot, config=self.config, server_state=self.server_state, app_state={})
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:

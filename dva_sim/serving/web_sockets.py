@@ -25,10 +25,10 @@ class WireProtocol(WebSocketsSansIOProtocol):
         given: See `WebSocketsSansIOProtocol`.
     """
 
-    def __init__(self, place: PortConnection, **options: Any) -> None:
+    def __init__(self, slot: PortConnection, **options: Any) -> None:
         super().__init__(**options)
-        self._place = place
-        self.app = extended(self.app, {PLACE: place, WIRE: self})
+        self._place = slot
+        self.app = extended(self.app, {PLACE: slot, WIRE: self})
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Release the place of the connection."""

@@ -49,10 +49,10 @@ class Incidence:
 
     def at(self, times: ArrayLike, cause: int = 1) -> Floats:
         """Return the share that had met a cause (1: the first) by each of some times [s]."""
-        place = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
+        index = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
         if not self.events:
-            return np.full(place.shape, np.nan)
-        share: Floats = np.r_[0.0, self.shares[cause - 1]][place]
+            return np.full(index.shape, np.nan)
+        share: Floats = np.r_[0.0, self.shares[cause - 1]][index]
         return share
 
     def restricted_mean(self, limit: float, cause: int = 1) -> float:
@@ -109,9 +109,9 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
     """
     when = np.asarray(time, dtype=float)
     what = np.asarray(cause, dtype=np.intp)
-    times, place = np.unique(when[what != CUT], return_inverse=True)
+    times, index = np.unique(when[what != CUT], return_inverse=True)
     met = np.zeros((causes, len(times)))
-    np.add.at(met, (what[what != CUT] - 1, place), 1.0)
+    np.add.at(met, (what[what != CUT] - 1, index), 1.0)
     at_risk = len(when) - np.searchsorted(np.sort(when), times, side="left")
     step = met / np.maximum(at_risk, 1)
     left = np.cumprod(1.0 - step.sum(axis=0))  # Kaplan-Meier of all causes together

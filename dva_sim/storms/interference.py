@@ -155,9 +155,9 @@ def corrupts(share: float, chance: random.Random) -> Meddling:
         if not isinstance(passing.payload, bytes) or chance.random() >= share:
             return False
         data = passing.payload
-        place = chance.randrange(len(passing.payload))
+        index = chance.randrange(len(passing.payload))
         new = bytes([chance.randrange(256)]) * chance.randrange(3)
-        altered = data[:place] + new + data[place + 1 :]
+        altered = data[:index] + new + data[index + 1 :]
         interference.deliver(passing._replace(payload=altered))
         return True
 

@@ -164,8 +164,8 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
         try:
             cell_grid.rehearse(study, cell)
         except ConfigError as error:
-            place = ("parts", cell.part, "scenario")
-            yield error if error.file is not None else document.error(error.problem, place)
+            path = ("parts", cell.part, "scenario")
+            yield error if error.file is not None else document.error(error.problem, path)
 
 
 def _check_registration(document: Document) -> Iterator[ConfigError]:

@@ -340,15 +340,15 @@ def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> I
         if isinstance(piece, Relocation) and not policy.relocates:
             yield "relocates somebody without `relocates = True`", ""
         for name, count in lengths[type(piece)].items():
-            if not _is_place(place := getattr(piece, name), count):
-                yield f"names a {name} that is not there", f"{place!r} of {count} "
+            if not _is_place(index := getattr(piece, name), count):
+                yield f"names a {name} that is not there", f"{index!r} of {count} "
 
 
-def _is_place(place: object, count: int) -> bool:
-    if isinstance(place, bool):
+def _is_place(index: object, count: int) -> bool:
+    if isinstance(index, bool):
         return False
     try:
-        return 0 <= operator.index(place) < count  # type: ignore[arg-type]
+        return 0 <= operator.index(index) < count  # type: ignore[arg-type]
     except TypeError:
         return False
 
@@ -359,8 +359,8 @@ def _twice(advice: Sequence[Any]) -> Iterator[Case]:
         "task": (Assignment, Announcement),
     }.items():
         places = [getattr(piece, name) for piece in advice if isinstance(piece, kinds)]
-        for place in sorted({place for place in places if places.count(place) > 1})[:1]:
-            yield f"uses a {name} twice", f"{name} {place} "
+        for index in sorted({index for index in places if places.count(index) > 1})[:1]:
+            yield f"uses a {name} twice", f"{name} {index} "
 
 
 def _forbidden(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:

@@ -159,8 +159,8 @@ class _FilterTrial:
                 if one.batch is None and one.value() != beside[-1]:
                     yield "changes when it is asked, though it has no batch", f"sample {number}"
         if alone != beside:
-            place = next(n for n, (a, b) in enumerate(zip(alone, beside, strict=True)) if a != b)
-            yield "shares memory with other copies, or draws random numbers", f"value {place + 1}"
+            index = next(n for n, (a, b) in enumerate(zip(alone, beside, strict=True)) if a != b)
+            yield "shares memory with other copies, or draws random numbers", f"value {index + 1}"
 
     def _constant(self) -> Iterator[Case]:
         """Check that a constant input comes through, regardless of the history."""

@@ -105,8 +105,8 @@ class Lidar:
         """Return pairs within reach: indices in `others`, and in `bodies`."""
         at = np.array([(body.x, body.y, body.radius) for body in others]).reshape(-1, 3)
         away = np.hypot(at[:, 0] - eyes[:, :1], at[:, 1] - eyes[:, 1:2])
-        place = {body: number for number, body in enumerate(others)}
-        away[np.arange(len(bodies)), [place[body] for body in bodies]] = np.inf  # itself
+        number_of = {body: number for number, body in enumerate(others)}
+        away[np.arange(len(bodies)), [number_of[body] for body in bodies]] = np.inf  # itself
         by, seen = np.nonzero(away < self.reach + at[:, 2])
         return seen, by
 

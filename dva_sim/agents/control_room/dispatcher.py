@@ -174,7 +174,7 @@ class ScriptedDispatcher:
         return m.Assign(number, chosen, None, task, "as the script says", seen)
 
     def _rule(self, status: m.EventStatus, proposal: m.Proposal) -> Overrule | None:
-        for place, rule in enumerate(self.profile.overrules):
+        for index, rule in enumerate(self.profile.overrules):
             below = rule.confidence_below
             holds = (
                 rule.kind in (None, status.kind)
@@ -183,7 +183,7 @@ class ScriptedDispatcher:
                 and rule.advised in (None, self._kind(proposal.device))
             )
             if holds:
-                whim = self._streams(f"overrule/{status.event_id}/{place}").random()
+                whim = self._streams(f"overrule/{status.event_id}/{index}").random()
                 if whim < rule.share:
                     return rule
         return None

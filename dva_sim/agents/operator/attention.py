@@ -70,14 +70,14 @@ def next_screen(
         seen: Time of the latest look at each [s].
         glance: Time for which one that only drives is looked at [s].
     """
-    waiting = [(time, place) for place, time in enumerate(waits) if time is not None]
+    waiting = [(time, index) for index, time in enumerate(waits) if time is not None]
     if current is not None and waits[current] is not None:
         return current
     if waiting:
         return min(waiting)[1]
     if current is not None and now - since < glance:
         return current
-    others = [place for place in range(len(seen)) if place != current]
+    others = [index for index in range(len(seen)) if index != current]
     return min(others, key=seen.__getitem__)
 
 
@@ -121,8 +121,8 @@ class Attention:
             return
         if screen is self._current:
             self._turn_away()
-        place = self._screens.index(screen)
-        del self._screens[place], self._seen[place]
+        index = self._screens.index(screen)
+        del self._screens[index], self._seen[index]
         if self._current is None and self._screens:
             self._turn_to(self._best())
 
@@ -144,9 +144,9 @@ class Attention:
         now = self._clock.now
         return next_screen(now, current, self._since, waits, self._seen, self._glance)
 
-    def _turn_to(self, place: int) -> None:
-        self._screens[place].log.turned_to += 1
-        self._look(self._screens[place], self._clock.now + self._switch)
+    def _turn_to(self, index: int) -> None:
+        self._screens[index].log.turned_to += 1
+        self._look(self._screens[index], self._clock.now + self._switch)
 
     def _look(self, screen: Screen, since: float) -> None:
         self._current = screen

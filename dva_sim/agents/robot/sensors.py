@@ -326,10 +326,10 @@ class RobotSensor:
 
     def _normals(self, sample: int, count: int) -> Floats:
         """Return standard normal numbers of one sample, shape `(count,)`."""
-        block, place = divmod(sample, BLOCK)
+        block, index = divmod(sample, BLOCK)
         if self._noise[0] != block or self._noise[1].shape[1] != count:
             self._noise = block, self._streams(f"noise {block}").normal(size=(BLOCK, count))
-        return np.asarray(self._noise[1][place])
+        return np.asarray(self._noise[1][index])
 
 
 class Around(Protocol):

@@ -62,9 +62,9 @@ def _announce(situation: Situation, free: Free) -> list[Announcement]:
     """Return the oldest task that has not been announced and that somebody free could do."""
     if any(task.auction == "open" for task in situation.tasks):
         return []
-    for place in waiting(situation):
-        task = situation.tasks[place]
+    for index in waiting(situation):
+        task = situation.tasks[index]
         new = task.stage == "confirm" and task.auction is None
-        if new and free.best(situation.eta[place]) is not None:
-            return [Announcement(place)]
+        if new and free.best(situation.eta[index]) is not None:
+            return [Announcement(index)]
     return []

@@ -48,10 +48,10 @@ class Coverage(Policy):
             return chosen
         sent = {choice.responder for choice in chosen}
         guards = [
-            place
-            for place, responder in enumerate(situation.responders)
-            if responder.kind == "guard" and responder.engaged is None and place not in sent
-            if np.isfinite(situation.cover.eta[place]).any()
+            index
+            for index, responder in enumerate(situation.responders)
+            if responder.kind == "guard" and responder.engaged is None and index not in sent
+            if np.isfinite(situation.cover.eta[index]).any()
         ]
         return [*chosen, *self._moves(situation.cover, guards)]
 

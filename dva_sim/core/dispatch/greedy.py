@@ -58,7 +58,7 @@ class Free:
 def waiting(situation: Situation) -> list[int]:
     """Places of the tasks that can be done now and that nobody is under way to, oldest first."""
     tasks = enumerate(situation.tasks)
-    return [place for place, task in tasks if task.due and task.engaged is None]
+    return [index for index, task in tasks if task.due and task.engaged is None]
 
 
 def reachable(situation: Situation, cost: Floats) -> Floats:

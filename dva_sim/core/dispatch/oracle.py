@@ -179,8 +179,8 @@ class OraclePolicy(Policy):
 
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        tasks = {situation.tasks[place].event - 1: place for place in waiting(situation)}
-        places = {responder.device: place for place, responder in enumerate(situation.responders)}
+        tasks = {situation.tasks[index].event - 1: index for index in waiting(situation)}
+        places = {responder.device: index for index, responder in enumerate(situation.responders)}
         free = Free(situation)
         chosen = []
         for device, tour in zip(self.devices, self.plan.tours, strict=True):

@@ -75,8 +75,8 @@ class HazardTeam(Policy):
     def _to_stand_by(self, situation: Situation) -> list[int]:
         """Tasks that a person can wait for: those of dangerous events that a robot looks at."""
         return [
-            place
-            for place, task in enumerate(situation.tasks)
+            index
+            for index, task in enumerate(situation.tasks)
             if task.stage == "contain" and not task.due and task.engaged is None
             if task.kind in self.dangerous and self._by_robot.get(task.event, False)
         ]

@@ -93,8 +93,8 @@ class Preemptive(Policy):
 def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
     """Return places of the tasks that wait; those of one urgency in the order they came."""
 
-    def urgency(place: int) -> float:
-        task = situation.tasks[place]
+    def urgency(index: int) -> float:
+        task = situation.tasks[index]
         return task.severity + ageing_per_s * (situation.now - task.waiting_since)
 
     return sorted(waiting(situation), key=urgency, reverse=True)  # stable, reversed too

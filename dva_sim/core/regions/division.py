@@ -79,8 +79,8 @@ class Division:
             return False
         if claim.epoch >= newest.epoch:
             self.forgotten.discard(region)
-        place = self.lines[region].index
-        is_higher = (claim.epoch, -place(claim.dva)) > (newest.epoch, -place(newest.dva))
+        rank = self.lines[region].index
+        is_higher = (claim.epoch, -rank(claim.dva)) > (newest.epoch, -rank(newest.dva))
         if is_higher:
             self.claims[region] = claim
         return is_higher

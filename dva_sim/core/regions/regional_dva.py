@@ -48,8 +48,8 @@ class RegionalDva(Dva):
     def __init__(self, *args: Any, division: Division, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.division = division
-        place = [line[0] for line in division.lines.values()].index(division.own)
-        self.events.first = NUMBERS * place + LIFE * (division.life % (NUMBERS // LIFE))
+        index = [line[0] for line in division.lines.values()].index(division.own)
+        self.events.first = NUMBERS * index + LIFE * (division.life % (NUMBERS // LIFE))
         self.help = MutualHelp(division, self.dispatcher)
         self.borders = Borders(division, self.orders, self.help)
         self.deputy = Deputy(division, self.orders, self.help)

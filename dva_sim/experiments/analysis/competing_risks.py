@@ -119,7 +119,7 @@ class Endings:
         masks = [self.under(level, stop) for level in (first, second)]
         sides = [person_means(done[mask], self._person[mask]) for mask in masks]
         both, *places = np.intersect1d(sides[0][0], sides[1][0], return_indices=True)
-        a, b = (means[place] for (_, means), place in zip(sides, places, strict=True))
+        a, b = (means[index] for (_, means), index in zip(sides, places, strict=True))
         return paired_difference(a, b, both)
 
 

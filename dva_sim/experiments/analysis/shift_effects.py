@@ -180,4 +180,4 @@ def _crossed(ranked: Floats, weights: Floats, levels: Floats) -> Floats:
     """Return the first value by which a share of the weight `(b, n)` is reached, `(b, q)`."""
     upto = np.cumsum(weights, axis=1)
     places = [(upto >= q * upto[:, -1:] - 1e-9).argmax(axis=1) for q in levels]
-    return np.stack([ranked[place] for place in places], axis=1)
+    return np.stack([ranked[index] for index in places], axis=1)

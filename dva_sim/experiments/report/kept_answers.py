@@ -196,12 +196,12 @@ def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
     runs = load_so_far(folder).runs
     places = {key: n for n, key in enumerate(zip(runs["config"], runs["seed"], strict=True))}
     for job, _, row in sampled:
-        place = places.get(job.key)
-        if place is None:
+        address = places.get(job.key)
+        if address is None:
             if job.is_repeat:
                 continue
             raise ConfigError(f"{folder}: has no run {job.address} as it is now")
-        other = [c for c, value in row.items() if not _is_equal(runs[c][place], value)]
+        other = [c for c, value in row.items() if not _is_equal(runs[c][address], value)]
         if other:
             where = f"{other[0]} of run {job.address}"
             raise ConfigError(f"{folder}: this program gives another {where}; run the study again")

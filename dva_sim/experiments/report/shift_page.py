@@ -209,8 +209,8 @@ def _twins(shifts: Shifts) -> list[str]:
     """Return policies that came to the very same response in every shift at every load."""
     response = shifts.of("response_mean_s")
     groups: dict[bytes, list[str]] = {}
-    for place, policy in enumerate(shifts.policies):
-        groups.setdefault(response[:, place].tobytes(), []).append(policy)
+    for index, policy in enumerate(shifts.policies):
+        groups.setdefault(response[:, index].tobytes(), []).append(policy)
     return [listing(names) for names in groups.values() if len(names) > 1]
 
 

@@ -219,9 +219,9 @@ def few_that_weigh(finding: Finding, view: StudyView) -> str:
         runs = sum(int(np.isfinite(side).sum()) for side in sides)
         missed = sum(int((side < 1).sum()) for side in sides)
         if 0 < missed < runs / 4:
-            place = level_name(finding.over, view.stops[stop]) if view.over else ""
+            level = level_name(finding.over, view.stops[stop]) if view.over else ""
             median = quantile_interval(*_differences(finding, view, stop))
-            stops.append((place, missed, runs, median))
+            stops.append((level, missed, runs, median))
     horizon = quantity(finding.horizon, "s")
     return sentence("weighed", horizon=horizon, stops=stops, unit=finding.unit) if stops else ""
 

@@ -177,8 +177,11 @@ def sample(design: Design, seed: int) -> list[dict[str, Level]]:
     spans = design.ranges
     places = _places(design, len(spans), np.random.default_rng(derive_seed(seed, "design")))
     return [
-        {key: value_at(span, float(u)) for (key, span), u in zip(spans.items(), place, strict=True)}
-        for place in places
+        {
+            key: value_at(span, float(u))
+            for (key, span), u in zip(spans.items(), numbers, strict=True)
+        }
+        for numbers in places
     ]
 
 

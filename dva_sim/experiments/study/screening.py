@@ -79,8 +79,8 @@ def screening_study(study: Study) -> Study:
     numbers = screened(study)
     rows: list[dict[str, Level]] = [
         {
-            each.key: value_at(_range_of(each), float(np.clip(float(place), 0.0, 1.0)))
-            for each, place in zip(numbers, point, strict=True)
+            each.key: value_at(_range_of(each), float(np.clip(float(share), 0.0, 1.0)))
+            for each, share in zip(numbers, point, strict=True)
         }
         for point in walks_of(study).reshape(-1, len(numbers))
     ]

@@ -88,10 +88,10 @@ class PacketNumbers:
 
     def draw(self, now: float) -> float:
         """Implement `UniformNumbers`."""
-        place, inside = divmod(self._number(), _BLOCK)
-        if place != self._place:
-            self._place = place
-            self._block = self._streams.fresh(f"{self._name}/{place}").random(_BLOCK)
+        block, inside = divmod(self._number(), _BLOCK)
+        if block != self._place:
+            self._place = block
+            self._block = self._streams.fresh(f"{self._name}/{block}").random(_BLOCK)
         return float(self._block[inside])
 
 

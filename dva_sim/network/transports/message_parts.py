@@ -30,7 +30,7 @@ def parts_of(message: TransportMessage, header: int) -> list[MessagePart]:
     room = PACKET - IP_UDP - header
     count = max(1, math.ceil(message.size / room))
     sizes = [room] * (count - 1) + [message.size - room * (count - 1)]
-    return [MessagePart(message, place, count, size) for place, size in enumerate(sizes)]
+    return [MessagePart(message, index, count, size) for index, size in enumerate(sizes)]
 
 
 class Assembly:

@@ -362,9 +362,9 @@ def _cut(path: NDArray[np.float64], left: float) -> Pose | None:
     at = float(gone[-1]) - left
     if at < 0.0:
         return None
-    place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
-    x, y = path[place]
-    ahead = path[place + 1] - path[place]
-    share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
+    index = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
+    x, y = path[index]
+    ahead = path[index + 1] - path[index]
+    share = (at - gone[index]) / steps[index] if steps[index] > 0.0 else 0.0
     heading = math.atan2(ahead[1], ahead[0])
     return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)

@@ -180,7 +180,7 @@ def tables(recording: TimedRecording, follow: float = FOLLOW_S) -> dict[str, lis
     events = cohort(recording, follow)
     return {
         "runs": [run_row(recording, events, follow)],
-        "events": [_row(events, place) for place in range(len(events["event_id"]))],
+        "events": [_row(events, index) for index in range(len(events["event_id"]))],
         "responders": [_responder_row(recording, unit) for unit in recording.units],
     }
 
@@ -248,8 +248,8 @@ def _open_ones(raw: Columns) -> NDArray[np.intp]:
     return np.where(np.isfinite(raw["closed"]), raw["outcome"], len(OUTCOMES)).astype(np.intp)
 
 
-def _row(columns: Columns, place: int) -> Row:
-    return {name: values[place].item() for name, values in columns.items()}
+def _row(columns: Columns, index: int) -> Row:
+    return {name: values[index].item() for name, values in columns.items()}
 
 
 # --- their fates in time -------------------------------------------------------------------

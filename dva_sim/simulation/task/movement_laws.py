@@ -149,9 +149,9 @@ def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
     best = 0
     height = 0.0
     largest = max(values)
-    for place, value in enumerate(values):
+    for index, value in enumerate(values):
         if value > height:
-            best = place
+            best = index
             height = value
         elif height > SMALL * largest and value < (1.0 - falls) * height:
             break

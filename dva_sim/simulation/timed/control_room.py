@@ -109,9 +109,9 @@ def _reach(shift: Team, places: list[Place]) -> Floats:
     speeds = [u.group.speed_mps for u in shift.units if u.kind == "guard"]
     speed = sum(speeds) / len(speeds) if speeds else 1.0
     reach = np.empty((len(places), len(terrain.zones)))
-    for row, place in enumerate(places):
+    for row, index in enumerate(places):
         for zone in range(len(terrain.zones)):
-            reach[row, zone] = np.mean([terrain.length(place, s) for s in terrain.spots(zone)])
+            reach[row, zone] = np.mean([terrain.length(index, s) for s in terrain.spots(zone)])
     return reach / speed
 
 

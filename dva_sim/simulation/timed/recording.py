@@ -196,8 +196,8 @@ class Ledger:
         table = table.reshape(-1, len(COLUMNS))
         table = table[np.argsort(table[:, 0], kind="stable")]
         return {
-            name: table[:, place].astype(np.int64) if name in WHOLE else table[:, place].copy()
-            for place, name in enumerate(COLUMNS)
+            name: table[:, index].astype(np.int64) if name in WHOLE else table[:, index].copy()
+            for index, name in enumerate(COLUMNS)
         }
 
     @property
@@ -214,18 +214,18 @@ class Ledger:
 def _sum_up(cell: list[float], since: float, event: Event) -> None:
     """Add one event's times to the sums; shared ones may have been served before they came."""
     times = event.times
-    for place, name in enumerate(("assigned", "arrived", "confirmed", "closed")):
+    for index, name in enumerate(("assigned", "arrived", "confirmed", "closed")):
         time = times.get(name)
         if time is None:
             continue
         span = time - since
         if span < NO_WAIT_S:
             span = 0.0
-        elif place == 0:
+        elif index == 0:
             cell[WAITED] += 1.0
-        cell[COUNT + place] += 1.0
-        cell[SUM + place] += span
-        cell[SQUARES + place] += span * span
+        cell[COUNT + index] += 1.0
+        cell[SUM + index] += span
+        cell[SQUARES + index] += span * span
 
 
 def _row(
@@ -336,9 +336,9 @@ class TimedRecording:
 
     def total(self, measure: str, stream: int | None = None) -> tuple[float, float, float]:
         """Return the count, sum [s] and sum of squares [s^2] of one of `MEASURES`."""
-        place = MEASURES.index(measure)
+        index = MEASURES.index(measure)
         cells = self._of(self.cells, stream).reshape(-1, self.cells.shape[-1]).sum(axis=0)
-        return float(cells[COUNT + place]), float(cells[SUM + place]), float(cells[SQUARES + place])
+        return float(cells[COUNT + index]), float(cells[SUM + index]), float(cells[SQUARES + index])
 
     def mean(self, measure: str, stream: int | None = None) -> float:
         """Return the mean of one of `MEASURES` [s]; nan if there was none."""

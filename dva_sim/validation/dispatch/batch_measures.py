@@ -245,9 +245,9 @@ class Batches:
         self.sample = sample
         self.edges = np.linspace(sample.begins, sample.ends, count + 1)
         self.lengths = np.diff(self.edges)
-        place = np.searchsorted(self.edges, sample.detected, side="right") - 1
+        index = np.searchsorted(self.edges, sample.detected, side="right") - 1
         last = sample.detected == sample.ends
-        self.place = np.where(last, count - 1, place)
+        self.place = np.where(last, count - 1, index)
         self.inside = (self.place >= 0) & (self.place < count)
 
     def total(self, values: Floats, which: NDArray[np.bool_]) -> Floats:

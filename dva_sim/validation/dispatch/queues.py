@@ -189,9 +189,9 @@ def erlang_a(
     deaths = busy * rate + (inside - busy) * impatience
     chance = birth_death(np.full(len(inside) - 1, arrival_rate), deaths[1:])
     abandoned = float(chance @ (inside - busy)) * impatience / arrival_rate
-    place = np.arange(1, most + 2)  # of who arrives when all servers are busy
-    served = servers * rate / (servers * rate + place * impatience)
-    until = np.cumsum(1 / (servers * rate + place * impatience))
+    rank = np.arange(1, most + 2)  # of who arrives when all servers are busy
+    served = servers * rate / (servers * rate + rank * impatience)
+    until = np.cumsum(1 / (servers * rate + rank * impatience))
     wait = float(chance[servers:] @ (served * until)) / (1 - abandoned)
     delayed = float(chance[servers:].sum())
     measures = _usual(float(chance @ busy) / servers, delayed, wait, mean_service_s)

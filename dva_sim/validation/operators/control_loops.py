@@ -67,13 +67,13 @@ def integrator(gain_delay: float) -> list[float]:
     dt = 1.0 / STEPS
     strategy = Strategy(_person(gain_delay), LIMITLESS)
     frames = deque([1.0] * (STEPS + 1), maxlen=STEPS + 1)
-    place = 1.0
+    position = 1.0
     places = []
     for step in range(DELAYS * STEPS):
         x = 0.5 * (frames[0] + frames[1])
-        place += strategy.point(PointView(step * dt, _cursor(x, 0.0), 1.0))[0] * dt
-        frames.append(place)
-        places.append(place)
+        position += strategy.point(PointView(step * dt, _cursor(x, 0.0), 1.0))[0] * dt
+        frames.append(position)
+        places.append(position)
     return places
 
 
@@ -124,13 +124,13 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
     dt = delay / SMITH_STEPS
     predictor = Predictor(_person(gain), LIMITLESS)
     on_the_way = deque([0.0] * SMITH_STEPS, maxlen=SMITH_STEPS)
-    place = 0.0
+    position = 0.0
     places = []
     for step in range(round(end / dt)):
-        velocity, _ = predictor.point(PointView(step * dt, _cursor(place, 1.0), delay))
-        place += on_the_way[0] * dt
+        velocity, _ = predictor.point(PointView(step * dt, _cursor(position, 1.0), delay))
+        position += on_the_way[0] * dt
         on_the_way.append(velocity)
-        places.append(place)
+        places.append(position)
     return places
 
 

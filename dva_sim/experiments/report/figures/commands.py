@@ -130,8 +130,8 @@ def _panel(ax: Axes, view: StudyView, measure: ShownMeasure) -> None:
     count = len(view.lines)
     for index, (level, look) in enumerate(looks(view.line).items()):
         values = person_means(view.curve(grid, view.panels[0], level))
-        place = WIDTH * ((index + 0.5) / count - 0.5)
-        _marks(ax, place, values, look)
+        offset = WIDTH * ((index + 0.5) / count - 0.5)
+        _marks(ax, offset, values, look)
     scale = ", log scale" if measure.is_log else ""
     ax.set_title(f"{measure.title}{scale}", fontweight="normal")
     style.stops_axis(ax, view.over)
@@ -151,12 +151,12 @@ def _middle(values: Floats) -> Floats:
     return ends
 
 
-def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
+def _marks(ax: Axes, offset: float, values: Floats, look: Look) -> None:
     """Draw means over persons of `values` `(persons, stops)`, with their middle 90 %."""
     means = nan_mean(values, axis=0)
     stops = np.flatnonzero(np.isfinite(means))
     if not len(stops):
         return
     low, high = _middle(values[:, stops])
-    ax.vlines(stops + place, low, high, color=look.colour, lw=1.2, zorder=2)
-    ax.plot(stops + place, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)
+    ax.vlines(stops + offset, low, high, color=look.colour, lw=1.2, zorder=2)
+    ax.plot(stops + offset, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)

@@ -93,21 +93,21 @@ def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: 
         "zorder": 6,
     }
     if bars.along == "y":
-        place = (at, edge)
+        point = (at, edge)
         mark = "v^"[side > 0]
         offset = (6.0, -side * (2 + _LINE_PT * row))
         across = "left"
         up = "top" if side > 0 else "bottom"
     else:
-        place = (edge, at)
+        point = (edge, at)
         mark = "<>"[side > 0]
         offset = (-2.0 * side, 6 + _LINE_PT * row)
         across = "right" if side > 0 else "left"
         up = "bottom"
-    bars.axes.plot(*place, mark, ms=6, **look)
+    bars.axes.plot(*point, mark, ms=6, **look)
     bars.axes.annotate(
         bound,
-        place,
+        point,
         xytext=offset,
         textcoords="offset points",
         ha=across,

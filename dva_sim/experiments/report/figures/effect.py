@@ -229,21 +229,21 @@ def boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
 
     Where places are not to scale, between two levels is the middle between them.
     """
-    place = style.place_of(over, cadence.boundary_s) if over and cadence else None
-    if place is None or over is None or style.is_to_scale(over) or place.is_integer():
-        return place
-    return math.floor(place) + 0.5
+    index = style.place_of(over, cadence.boundary_s) if over and cadence else None
+    if index is None or over is None or style.is_to_scale(over) or index.is_integer():
+        return index
+    return math.floor(index) + 0.5
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None) -> None:
     """Mark the delay from which request/reply must fall behind the wanted rate."""
-    place = boundary(over, cadence)
-    if place is None or over is None or cadence is None:
+    index = boundary(over, cadence)
+    if index is None or over is None or cadence is None:
         return
-    ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
+    ax.axvline(index, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
     ax.annotate(
         f"2d + P = T\n(d = {level_name(over.name, round(cadence.boundary_s, 4))})",
-        (place, 0.98),
+        (index, 0.98),
         xycoords=("data", "axes fraction"),
         xytext=(4, 0),
         textcoords="offset points",

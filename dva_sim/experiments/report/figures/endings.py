@@ -86,7 +86,7 @@ class EndingsInTime(style.ReportFigure):
 
 def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level]) -> bool:
     places = itertools.product(lines, stops)
-    return all(bool(endings.is_right[endings.under(*place)].all()) for place in places)
+    return all(bool(endings.is_right[endings.under(*address)].all()) for address in places)
 
 
 def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[str, Floats]:

@@ -127,8 +127,8 @@ class Scatter(style.ReportFigure):
         for cloud, y in zip(clouds, means, strict=True):
             columns = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | columns)
-        place = f" ({setting(panel)})" if panel else ""
-        title = f"{capital(_what(view, clouds))} against each factor{place}"
+        panel_text = f" ({setting(panel)})" if panel else ""
+        title = f"{capital(_what(view, clouds))} against each factor{panel_text}"
         return self.finish(figure, caption("scatter"), numbers, title=title)
 
 
