@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Final
 
@@ -21,8 +21,8 @@ from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 MAX_LOGGED: Final = 256  # requests that are kept
 MAX_LISTED: Final = 32  # of one answer
 KEPT_FOR: Final = 60.0  # after the last question for them, as a `DevSub` [s]
-SHOWN_BYTES: Final = 4096  # of a request [B]
-ENTRY_BYTES: Final = 280  # of one request without its bytes and the text of its answer, at most [B]
+SHOWN_BYTES: Final = 4096  # of a request, and of its answer where both fit into a message [B]
+ENTRY_BYTES: Final = 300  # of one request without all bytes and the text of its answer, at most [B]
 _NAMES: Final = "|".join(
     sorted(name for name in limits.names() if limits.types_of(name) & {"Session", "SessionID"})
 )
@@ -42,6 +42,7 @@ class KeptRequest:
         data: Its first bytes.
         service_time: Time until the answer [s]; None: there was none.
         reply: The answer, if there was one.
+        answer: Its bytes.
     """
 
     number: int
@@ -50,6 +51,7 @@ class KeptRequest:
     data: bytes
     service_time: float | None = None
     reply: m.Reply | None = None
+    answer: bytes = b""
 
 
 @dataclass
@@ -73,19 +75,23 @@ class KeptRequests:
         """Return True if somebody has asked for requests lately."""
         return now < self._wanted_until
 
+    def want(self, now: float) -> None:
+        """Keep requests for a while: somebody asks for them, or is about to."""
+        self._wanted_until = now + KEPT_FOR
+
     def keep(self, request: KeptRequest) -> None:
         """Keep a request; the oldest makes room."""
         self._kept.append(request)
 
     def above(self, number: int, now: float) -> m.RequestLog:
         """Return the requests above a number, as many as fit into a message, and keep more."""
-        self._wanted_until = now + KEPT_FOR
+        self.want(now)
         listed = list[m.LoggedRequest]()
         room = LIST_BYTES
         newer = (request for request in self._kept if request.number > number)
         for request in islice(newer, MAX_LISTED):
             entry = _entry(request, now)
-            room -= ENTRY_BYTES + len(entry.request) + xml_size(entry.text or "")
+            room -= ENTRY_BYTES + _size(entry) + len(entry.reply or "")
             if listed and room < 0:
                 break
             listed.append(entry)
@@ -95,15 +101,25 @@ class KeptRequests:
 def _entry(request: KeptRequest, now: float) -> m.LoggedRequest:
     reply = request.reply
     took = request.service_time
-    return m.LoggedRequest(
+    entry = m.LoggedRequest(
         request_number=request.number,
         ago=sent_time(now - request.arrived),
         size=request.size,
-        request=b64encode(without_sessions(request.data)).decode(),
+        request=_shown(request.data),
         service_time=None if took is None else sent_time(took),
         code=None if reply is None else reply.code,
         text=None if reply is None else reply.text or None,
     )
+    room = max(0, LIST_BYTES - ENTRY_BYTES - _size(entry)) // 4 * 3
+    return replace(entry, reply=_shown(request.answer, room) or None)
+
+
+def _size(entry: m.LoggedRequest) -> int:
+    return len(entry.request) + xml_size(entry.text or "")
+
+
+def _shown(data: bytes, room: int = SHOWN_BYTES) -> str:
+    return b64encode(without_sessions(data)[: min(room, SHOWN_BYTES)]).decode()
 
 
 def without_sessions(data: bytes) -> bytes:

@@ -371,6 +371,7 @@ class LoggedRequest:
         service_time: Time until the answer [s]; None: there is none.
         code: Code of the answer.
         text: Text of the answer.
+        reply: First bytes of the answer, as many as fit, like those of the request.
     """
 
     request_number: int
@@ -380,6 +381,7 @@ class LoggedRequest:
     service_time: float | None = None
     code: int | None = None
     text: str | None = None
+    reply: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

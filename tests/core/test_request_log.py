@@ -1,6 +1,7 @@
 """The log of requests: the newest, in numbers, without what would let a reader act as others."""
 
 from base64 import b64decode
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -20,15 +21,23 @@ DVA, ROOM = "02:00:00:00:00:01", "02:00:00:07:00:01"
 SESSION = 17 << 32 | 0xDEAD_BEEF
 
 
-def filled(count: int, data: bytes = b"<msg>", reply: m.Reply | None = None) -> KeptRequests:
+def filled(
+    count: int, data: bytes = b"<msg>", reply: m.Reply | None = None, answer: bytes = b""
+) -> KeptRequests:
     """Return a log that was asked for at 0 s, with one request a second."""
     log = KeptRequests()
     log.above(0, 0.0)
     for second in range(1, count + 1):
-        request = KeptRequest(
-            number=log.count(), arrived=second, size=len(data), data=data, reply=reply
+        log.keep(
+            KeptRequest(
+                number=log.count(),
+                arrived=second,
+                size=len(data),
+                data=data,
+                reply=reply,
+                answer=answer,
+            )
         )
-        log.keep(request)
     return log
 
 
@@ -58,9 +67,13 @@ def test_all_can_be_read_in_steps_of_what_fits():
     assert found == list(range(1, 81))
 
 
-@given(size=st.integers(0, 4096), text=st.text("&<é \U0001f600", max_size=256))
-def test_each_answer_fits_into_a_message(size, text):
-    log = filled(20, b"y" * size, m.Reply(1, m.BUSY, text))
+@given(
+    size=st.integers(0, 4096),
+    text=st.text("&<é \U0001f600", max_size=256),
+    answer=st.integers(0, 8192),
+)
+def test_each_answer_fits_into_a_message(size, text, answer):
+    log = filled(20, b"y" * size, m.Reply(1, m.BUSY, text), b"z" * answer)
     said = m.Message(ROOM, 1, DVA, "12:30:56", 0, m.Reply(1, m.OK, "", log.above(0, 300.0)))
     assert decode(encode(said)) == said
 
@@ -75,6 +88,22 @@ def test_an_entry_tells_age_size_answer_and_how_long_it_took():
     assert b64decode(entry.request) == b"abc"
     told = entry.ago, entry.size, entry.service_time, entry.code, entry.text
     assert told == (2.5, 9000, 0.25, m.NOT_REGISTERED, "who are you?")
+    assert entry.reply is None
+
+
+def test_an_answer_is_shown_without_the_random_half_of_the_session_that_it_grants():
+    permission = m.Permission("02:00:00:01:00:01", "teleoperation", SESSION)
+    reply = m.Reply(9, m.OK, "", permission)
+    said = encode(m.Message(ROOM, 1, DVA, "12:30:56", 0, reply))
+    (entry,) = filled(1, reply=reply, answer=said).above(0, 300.0).requests
+    shown = decode(b64decode(entry.reply or "")).body
+    assert isinstance(shown, m.Reply)
+    assert shown.content == replace(permission, session=17 << 32)
+
+
+def test_beside_a_long_request_as_much_of_its_answer_is_shown_as_fits():
+    (entry,) = filled(1, b"y" * 4096, answer=b"z" * 4096).above(0, 300.0).requests
+    assert 900 < len(entry.reply or "") < 1300
 
 
 @pytest.mark.parametrize(

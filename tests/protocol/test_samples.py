@@ -45,7 +45,7 @@ NEW = {
     "1.9": {
         *("event-report-passed-on", "hand-over", "hand-over-to-a-known-address"),
         *("peer-status", "peer-status-of-no-region", "replicate"),
-        *("give-back", "give-back-between-dvas"),
+        *("give-back", "give-back-between-dvas", "reply-request-log-with-replies"),
     },
 }
 OLD = {

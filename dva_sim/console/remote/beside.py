@@ -60,6 +60,7 @@ class PageBeside:
             return
         self._dva = dva
         dva.appoint(own, UNATTENDED)
+        dva.agent.keep_requests()  # else those that come before the page does are in no log
         port = DvaPort(lambda: dva.agent, dva.network, dva.address)
         child = self._child = PipedChild("the page", MODULE, [self._argument(own)], [], PLAIN)
 

@@ -93,7 +93,7 @@ class RequestReader:
             entry.request_number,
             round(1000 * (self._now - entry.ago)),
             b64decode(entry.request).decode("latin-1"),
-            None,
+            None if entry.reply is None else b64decode(entry.reply).decode("latin-1"),
             None if took is None else round(1e6 * took),
             0,
             entry.code,

@@ -79,6 +79,11 @@ class Entry:
         """Return True if only the first bytes of the request are known."""
         return self.sent > len(self.data)
 
+    @property
+    def is_reply_cut(self) -> bool:
+        """Return True if only the first bytes of the reply are known."""
+        return self.reply is not None and not self.reply.rstrip().endswith(b"</msg>")
+
     def _read(self) -> None:
         self.header = header_of(self.data)
         try:

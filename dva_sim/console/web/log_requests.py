@@ -112,6 +112,7 @@ def whole(entry: Entry) -> dict[str, Any]:
         "request": request,
         "problems": [] if entry.is_cut else problems,
         "reply": None if entry.reply is None else laid_out(entry.reply)[0],
+        "reply_cut": entry.is_reply_cut,
         "code": entry.code,
         "word": m.CODE_NAMES.get(entry.code, "") if entry.code is not None else "",
         "text": entry.text,

@@ -9,8 +9,8 @@ class ExchangesLine(TypedDict):
     """Exchanges of a device; the flag says to discard earlier lines.
 
     Each has a number, time [ms], request, reply, service time [us] and 1 for a publication; bytes
-    as latin-1. Where the reply itself is not known, its code and text follow, and the size of the
-    request [B], of which the first bytes may be known alone.
+    as latin-1. Where only the first bytes of either may be known, code and text of the reply
+    follow, and the size of the request [B].
     """
 
     k: Literal["log"]

@@ -158,6 +158,10 @@ class DvaAgent:
             sends += granted[1] if granted is not None else []
         self._carry_out(sends)
 
+    def keep_requests(self) -> None:
+        """Keep requests from now on, for a reader that is about to come."""
+        self._requests.want(self.device.clock.now)
+
     def _on_arrival(self, request: Request) -> None:
         """Take a request, and log it if a control room wants to see it."""
         log = self._requests
@@ -174,15 +178,15 @@ class DvaAgent:
         number = self._requests.count()
         arrived = self.device.clock.now
         begun = self.stopwatch()
-        answered: list[tuple[float, m.Reply | None]] = []
+        answered: list[tuple[float, bytes]] = []
 
         def answer(data: bytes) -> None:
-            body = decode(data).body
-            answered.append((self.stopwatch() - begun, body if isinstance(body, m.Reply) else None))
+            answered.append((self.stopwatch() - begun, data))
             request.answer(data)
 
         self._take(request._replace(answer=answer))
-        took, reply = answered[0] if answered else (None, None)
+        took, data = answered[0] if answered else (None, b"")
+        reply = decode(data).body if data else None
         self._requests.keep(
             KeptRequest(
                 number=number,
@@ -190,7 +194,8 @@ class DvaAgent:
                 size=len(request.data),
                 data=request.data[:SHOWN_BYTES],
                 service_time=took,
-                reply=reply,
+                reply=reply if isinstance(reply, m.Reply) else None,
+                answer=data,
             )
         )
 

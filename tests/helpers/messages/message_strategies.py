@@ -48,6 +48,7 @@ STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
     "code": st.integers(0, 999),
     "laps": st.integers(0, 1000),
     "request": st.binary(max_size=300).map(lambda data: b64encode(data).decode()),
+    "reply": st.binary(max_size=300).map(lambda data: b64encode(data).decode()),
     "seen_tick tick": st.integers(0, 2**53 - 1),
     "session": st.integers(1, UINT64),
     "waypoints_left": st.integers(0, 64),

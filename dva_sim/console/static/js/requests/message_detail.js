@@ -58,6 +58,7 @@ function Whole({ found }) {
     <${Source} text=${found.request} problems=${found.problems} name="XML of the request" />
     <h3>Reply</h3>
     <p class=${found.code ? 'wrong' : ''}>${found.code === null ? answered : `${found.code} ${found.word}${found.text ? `: ${found.text}` : ''}`}</p>
+    ${found.reply_cut && html`<p class="soft">The log has the first ${countText(found.reply.length)} characters of it.</p>`}
     ${found.reply !== null && html`<${Source} text=${found.reply} problems=${[]} name="XML of the reply" />`}`;
 }
 

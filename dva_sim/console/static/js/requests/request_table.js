@@ -77,9 +77,10 @@ export function replyText(row) {
   return `${row.code} ${row.word}${words}`;
 }
 
-/** @param {number} ms */
+/** @param {number} ms negative before the page's own start */
 export function timeText(ms) {
-  return `${clockText(ms)}.${String(Math.floor(ms % 1000)).padStart(3, '0')}`;
+  const since = Math.abs(ms);
+  return `${ms < 0 ? '−' : ''}${clockText(since)}.${String(Math.floor(since % 1000)).padStart(3, '0')}`;
 }
 
 /** @param {number | null} us */
