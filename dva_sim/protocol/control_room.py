@@ -335,6 +335,9 @@ class AuditRecord:
         arrival_in: Expected arrival of the device [s from then].
         advised: Id of the guard or robot that the policy would have sent; None: nobody.
         advised_in: Expected arrival of the advised device [s from then].
+        operator: Id of the device that drives the robot.
+        dispatch_mode: New mode of dispatch: `automatic` or `ask_first`.
+        note: Text of a note, kind of an event that was raised, or word for its severity.
     """
 
     author: str
@@ -350,6 +353,9 @@ class AuditRecord:
     arrival_in: float | None = None
     advised: str | None = None
     advised_in: float | None = None
+    operator: str | None = None
+    dispatch_mode: str | None = None
+    note: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

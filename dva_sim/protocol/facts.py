@@ -69,27 +69,6 @@ class Fact:
         """Return the fact by names, as plain numbers and words that JSON can hold."""
         return asdict(self)
 
-    @classmethod
-    def of_record(cls, record: m.AuditRecord, time: float, waited: float | None) -> Fact:
-        """Return a fact as a message tells it, which was heard at a time [s]."""
-        return cls(
-            time=time,
-            author=record.author,
-            label=record.label,
-            action=record.action,
-            role=record.role,
-            event=record.event_id,
-            device=record.device,
-            task=record.task,
-            arrival_in=record.arrival_in,
-            cause=record.reason,
-            code=record.code,
-            outcome=record.text,
-            advised=record.advised,
-            advised_in=record.advised_in,
-            waited=waited,
-        )
-
     def record(self) -> m.AuditRecord:
         """Return the fact as a message, as far as a message can hold it."""
         return m.AuditRecord(
@@ -106,6 +85,9 @@ class Fact:
             arrival_in=_span(self.arrival_in),
             advised=self.advised,
             advised_in=_span(self.advised_in),
+            operator=self.operator,
+            dispatch_mode=self.mode,
+            note=None if self.text is None else self.text[:256],
         )
 
 

@@ -46,6 +46,7 @@ NEW = {
         *("event-report-passed-on", "hand-over", "hand-over-to-a-known-address"),
         *("peer-status", "peer-status-of-no-region", "replicate"),
         *("give-back", "give-back-between-dvas", "reply-request-log-with-replies"),
+        *("audit-record-mode", "audit-record-note", "audit-record-operator"),
     },
 }
 OLD = {

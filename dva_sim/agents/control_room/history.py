@@ -76,8 +76,8 @@ class EventHistory:
         """Return the words of a decision besides its reason."""
         if record.action == "severity":
             return record.text
-        if record.action == "note":  # the status has told of it, the record does not
-            return (self._known and self._known.note) or ""
+        if record.action == "note":  # before version 1.9 the status alone tells of it
+            return record.note or (self._known and self._known.note) or ""
         task = record.task or "confirm"
         return "" if task == "confirm" else f"to {task.replace('_', ' ')}"
 

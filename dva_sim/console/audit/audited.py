@@ -1,4 +1,4 @@
-"""Rows of the audit log: what people ask for at pages, and what the DVA says that it decided.
+"""Rows of the audit log about what people ask for at pages.
 
 An answer to a page waits until its row is on the disk. Whatever only stops something never waits.
 """
@@ -6,15 +6,12 @@ An answer to a page waits until its row is on the disk. Whatever only stops some
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final, Unpack
+from typing import Final, Unpack
 
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
+from dva_sim.console.wire.actions import ACTIONS, Asked
 from dva_sim.console.wire.seats import REFUSAL, Answered
-from dva_sim.protocol import messages as m
-from dva_sim.protocol.facts import Fact
-from dva_sim.recordings.audit_log import AuditEntry
 
 DONE: Final = "done"
 _HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
@@ -53,9 +50,7 @@ class Audited:
             raise Refused(f"{self.keeper.problem}; nothing can be done until this is fixed")
 
         def log_and_answer(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
-            if self.is_noted(action):
-                outcome = more.get("outcome", DONE if ok else REFUSAL)
-                self._note(what, client, line, outcome, text)
+            self._note(what, client, line, more.get("outcome", DONE if ok else REFUSAL), text)
             if action.stops:
                 on_result(ok, text, **more)
                 return
@@ -69,10 +64,6 @@ class Audited:
             self.keeper.when_safe(safe)
 
         return log_and_answer
-
-    def is_noted(self, action: Action) -> bool:
-        """Return True if an action has a row of its own; of the others the DVA tells."""
-        return action.audit is Audit.OWN
 
     def _note(self, what: str, client: str, line: Asked, outcome: str, text: str) -> None:
         robots = line.get("robots") or ([line["robot"]] if "robot" in line else [])
@@ -92,41 +83,6 @@ class Audited:
             )
         )
 
-    def decided(self, fact: Fact) -> None:
-        """Keep what the DVA, or somebody at it, has decided."""
-        self.keeper.put(self._entry(fact))
-
-    def _entry(self, fact: Fact) -> AuditEntry:
-        ok = fact.code == m.OK
-        arguments: Asked = {
-            "task": fact.task,
-            "mode": fact.mode,
-            "operator": fact.operator and self._label(fact.operator),
-            "arrival_s": fact.arrival_in,
-            "waited_s": fact.waited,
-        }
-        details: Asked = {
-            key: _short(value) for key, value in arguments.items() if value is not None
-        }
-        if fact.action == "assign":
-            details["advised"] = fact.advised and self._label(fact.advised)
-            details["advised_s"] = _short(fact.advised_in)
-        if not ok:
-            details["code"] = fact.code
-        answer_text = (fact.text, fact.outcome)
-        return self.keeper.entry(
-            fact.action.replace("_", " "),
-            fact.label,
-            device=fact.author,
-            role=fact.role or "",
-            event=fact.event,
-            subject=(fact.device and self._label(fact.device)) or "",
-            cause=fact.cause,
-            outcome=DONE if ok else REFUSAL,
-            text=": ".join(text for text in answer_text if text),
-            details=details,
-        )
-
 
 def name_of_page(client: str) -> str:
     """Return the fallback name of a page or a program that has no device."""
@@ -134,8 +90,3 @@ def name_of_page(client: str) -> str:
     if number.startswith("c"):
         return f"page {number}"
     return number if number == "program" else f"program {number}"
-
-
-def _short(value: Any) -> Any:
-    """Return a time to the millisecond; all else as it is."""
-    return round(value, 3) if isinstance(value, float) else value

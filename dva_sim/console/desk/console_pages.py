@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final, Protocol
 
 from dva_sim.cameras.lines import Show
-from dva_sim.console.audit.audited import Audited, name_of_page
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import name_of_page
+from dva_sim.console.audit.decisions_audited import DecisionAudit
 from dva_sim.console.driving.decision_actions import DecidingRooms
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seat_lines import SeatLines
@@ -61,6 +63,9 @@ class NamedRooms(DecidingRooms, Protocol):
 
     def entries(self) -> list[RoomEntry]:
         """Return who decides, and what each may."""
+
+    def room_of(self, client: str) -> str | None:
+        """Return the id of the control room by which a page's person decides."""
 
     def leave(self, client: str) -> object:
         """Note that a page is gone for good."""
@@ -119,7 +124,7 @@ class ConsolePages:
         self.users = rooms.users
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.alarms = ConsoleAlarms(system.agent, system.named, breaches)
-        self.audited: Audited | None = None
+        self.audited: DecisionAudit | None = None
         self.seat_sensors = SeatSensors(driven.alarm_at)
         self.seat_lines = SeatLines(driven, phones, self.seat_sensors)
         self._news = News(lambda: self.tell)
@@ -175,8 +180,15 @@ class ConsolePages:
         self.tell(self.seat_lines.free(client), client)
         self._news.forget("seat", client)
 
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do, and what the DVA decides, from now on."""
+        rooms = self.rooms
+        self.audited = DecisionAudit(keeper, self.system, self.author, rooms.room_of)
+
     def hear_record(self, record: m.AuditRecord) -> None:
-        """Note who takes a robot from its driver, whom the DVA tells no name."""
+        """Keep a decision, and note who takes a robot from its driver, whom the DVA names not."""
+        if self.audited is not None:
+            self.audited.heard(record)
         if record.action == "revoke" and record.code == m.OK and record.device is not None:
             reason = f": {record.reason}" if record.reason else ""
             robot = self.system.label_of(record.device)

@@ -13,7 +13,6 @@ from dva_sim.live.dva_port import DvaPort
 from dva_sim.network.real_network import NetworkError
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol.devices import ControlRoomRole
-from dva_sim.protocol.facts import Fact
 from dva_sim.simulation.full.device_table import DeviceTable
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA
@@ -81,16 +80,13 @@ class RunBench:
         self._run.dva.core.roles.appoint(room, role)
         then()
 
-    # --- what no message tells or asks for -------------------------------------------------
+    def forget(self, device: str, then: Callable[[], object] = do_nothing) -> None:
+        """Implement `Bench`."""
+        self._run.dva.dismiss(device)
+        then()
 
-    def note_decisions(self, decided: Callable[[Fact], object]) -> None:
-        """Have each decision of the DVA told from now on."""
-        self._run.dva.on_fact = decided
+    # --- what no message tells or asks for -------------------------------------------------
 
     def is_registered(self, device: str) -> bool:
         """Return True if an id is that of the DVA, or stands in its book."""
         return device == DVA or device in self._run.dva.core.registry.entries
-
-    def forget(self, device: str) -> None:
-        """Have the DVA forget a device at once."""
-        self._run.dva.dismiss(device)

@@ -201,6 +201,11 @@ class ConsoleRooms:
         """Return the name of each person who decides, by page."""
         return {client: room.device.label for client, room in self.by_client.items()}
 
+    def room_of(self, client: str) -> str | None:
+        """Return the id of the control room by which a page's person decides."""
+        room = self.by_client.get(client)
+        return None if room is None else room.device.id_tag
+
     def entries(self) -> list[RoomEntry]:
         """Return who decides."""
         return [

@@ -80,6 +80,10 @@ class NamedPeople:
         """Return the name of each person who has joined, by page."""
         return {client: name for client, (name, _) in self.by_client.items()}
 
+    def room_of(self, _: str) -> str:
+        """Return the id of the console's own control room: all decide by it."""
+        return self.listener.device.id_tag
+
     def entries(self) -> list[RoomEntry]:
         """Return who decides, within what both the DVA and the page's address allow."""
         most = ControlRoomRole(self._system.role)

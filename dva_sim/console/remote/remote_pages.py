@@ -11,6 +11,7 @@ from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.decisions_audited import DecisionAudit
 from dva_sim.console.bench import Bench
 from dva_sim.console.desk.console_pages import ConsolePages
 from dva_sim.console.driving.driven_system import REACH, DrivenSystem
@@ -19,7 +20,6 @@ from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.remote.links import RemoteLinks
 from dva_sim.console.remote.named_people import NamedPeople
 from dva_sim.console.remote.options import scenario_shown
-from dva_sim.console.remote.remote_audit import RemoteAudit
 from dva_sim.console.remote.remote_scene import LINK, remote_scene
 from dva_sim.console.system.known_system import SOMEWHERE, KnownSystem
 from dva_sim.console.system.request_reader import LOG, RequestReader
@@ -54,7 +54,7 @@ class RemotePages(ConsolePages):
         ConfigError: the site cannot be read.
     """
 
-    audited: RemoteAudit
+    audited: DecisionAudit
 
     def __init__(
         self,
@@ -94,7 +94,7 @@ class RemotePages(ConsolePages):
             system, rooms=NamedPeople(system), driven=driven, fakes=self._fakes(system), phones={}
         )
         self.requests = RequestReader(system.agent, lambda line: self.tell(line))
-        self.audited = RemoteAudit(keeper, system, self.author)
+        self.keep_audit(keeper)
 
     def close(self) -> None:
         """Take part no more."""
@@ -202,4 +202,3 @@ class RemotePages(ConsolePages):
         refused = f", refused: {record.text}" if record.code != m.OK else ""
         text = f"{record.action.replace('_', ' ')}{about}{refused}"
         self.system.recorder.tell(self.clock.now, record.label, text, "order")
-        self.audited.heard(record)

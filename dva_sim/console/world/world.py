@@ -17,7 +17,6 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.lines import FrameLine, contained_line, scene_line
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.audit.audited import Audited
 from dva_sim.console.desk.console_pages import ConsolePages
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.run_bench import RunBench
@@ -209,10 +208,9 @@ class ConsoleWorld(ConsolePages):
 
     # --- who did what ------------------------------------------------------------------------
 
+    @override
     def keep_audit(self, keeper: AuditKeeper) -> None:
-        """Keep what people do, and what the DVA decides, from now on."""
-        self.audited = Audited(keeper, self.author, self.system.named)
-        self.bench.note_decisions(self.audited.decided)
+        super().keep_audit(keeper)
         keeper.on_rows = self._audit_written
 
     def _audit_written(self, rows: Sequence[AuditRow]) -> None:

@@ -80,17 +80,20 @@ def test_what_others_and_the_policy_decide_is_a_row_by_the_dvas_record(page):
     world = page.world
     world.do("room_join", name="bob", role="supervise")
     world.do("event_acknowledge", event=1, role="supervise")
+    world.do("event_note", event=1, text="smoke", role="supervise")
     world.do("dispatch_mode", mode="automatic", role="supervise")
     page.until(lambda: "min_eta" in str(page.lines_of("story")))
     page.let(0.5)
-    rows = {(row.author, row.action) for row in page.written()}
+    rows = {(row.author, row.action): row for row in page.written()}
 
-    assert {("bob", "acknowledge"), ("bob", "set dispatch"), ("min_eta", "assign")} <= rows
+    assert {("bob", "acknowledge"), ("min_eta", "assign")} <= rows.keys()
+    assert rows["bob", "note"].text == "smoke"
+    assert rows["bob", "set dispatch"].details["mode"] == "automatic"
 
 
 def test_what_was_decided_without_an_answer_is_told_once_the_dva_publishes_it(page):
     record = m.AuditRecord(OWN, "control room", "escalate", "", m.OK, "", "supervise", 1)
-    page.pages.audited.heard(record)
+    page.pages.hear_record(record)
 
     (row,) = [row for row in page.written() if row.action == "escalate"]
     assert (row.author, row.outcome) == ("control room", "done")

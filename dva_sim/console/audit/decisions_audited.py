@@ -1,4 +1,4 @@
-"""The audit log at a remote DVA: what people do here, and what the DVA tells of decisions.
+"""Rows of the audit log about decisions: what people decide here, and what the DVA tells of.
 
 A decision of this console is one row: who asked for it at which page, what the DVA answered, and
 what its own record of it says beside, such as whom the policy would have sent. Of everybody else's
@@ -8,20 +8,19 @@ decisions there is the record alone. Where nobody answers, the outcome is `unkno
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Final, Unpack
+from typing import Any, Final, Unpack
 
 from typing_extensions import override
 
 from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.audit.audited import Audited
+from dva_sim.console.audit.audited import DONE, Audited
 from dva_sim.console.system.known_system import KnownSystem
-from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
-from dva_sim.console.wire.seats import Answered
+from dva_sim.console.wire.actions import ACTIONS, Asked, Audit
+from dva_sim.console.wire.seats import REFUSAL, Answered
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.facts import Fact
 
 RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
 
@@ -33,12 +32,14 @@ class AskedDecision:
     Attributes:
         action: Name that the DVA uses for it.
         event: About which event; None: none, or one that has no number yet.
+        client: Client of the page.
         record: Record published by the DVA.
         finish: Callback that reports the result; None: no reply yet.
     """
 
     action: str
     event: int | None
+    client: str
     record: m.AuditRecord | None = None
     finish: Callable[[], object] | None = None
 
@@ -48,20 +49,27 @@ class AskedDecision:
         return fits and self.record is None
 
 
-class RemoteAudit(Audited):
-    """Keeps the audit log of a console at a remote DVA.
+class DecisionAudit(Audited):
+    """Keeps the audit log of a console, with the decisions of its DVA.
 
     Args:
         keeper: Keeper of the file.
         system: System of the DVA.
         author: Name of the person at a page.
+        room: Function that returns the id of the control room of a page's person, if there is one.
     """
 
     def __init__(
-        self, keeper: AuditKeeper, system: KnownSystem, author: Callable[[str], str]
+        self,
+        keeper: AuditKeeper,
+        system: KnownSystem,
+        author: Callable[[str], str],
+        room: Callable[[str], str | None],
     ) -> None:
         super().__init__(keeper, author, system.named)
         self._system = system
+        self._room = room
+        self._rooms: set[str | None] = set()  # control rooms by which people have decided here
         self._asked: dict[str, AskedDecision] = {}  # by the id of the action
 
     @override
@@ -71,9 +79,10 @@ class RemoteAudit(Audited):
         if ACTIONS[what].audit is not Audit.DVA:
             return report
         number = str(line["id"])
-        asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))
+        asked = self._asked[number] = AskedDecision(_action(what), line.get("event"), client)
 
         def wait(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+            self._rooms.add(self._room(client))
             asked.finish = partial(report, ok, text, **more)
             if not ok or asked.record is not None:
                 asked.finish()
@@ -82,10 +91,6 @@ class RemoteAudit(Audited):
 
         return wait
 
-    def is_noted(self, action: Action) -> bool:
-        """Return True: the console knows of decisions by messages alone."""
-        return True
-
     def _finish(self, number: str) -> None:
         asked = self._asked.get(number)
         if asked is not None and asked.finish is not None:
@@ -93,30 +98,54 @@ class RemoteAudit(Audited):
 
     def heard(self, record: m.AuditRecord) -> None:
         """Take the DVA's record of a decision."""
-        if record.author == self._system.device.id_tag:
-            for number, asked in self._asked.items():
-                if asked.matches(record):
-                    asked.record = record
-                    self._finish(number)
-                    return
-            if record.code != m.OK:  # its answer has said so already
+        for number, asked in self._asked.items():
+            if asked.matches(record) and record.author == self._room(asked.client):
+                asked.record = record
+                self._finish(number)
                 return
-        self.decided(self._fact(record))
+        if record.code == m.OK or record.author not in self._rooms:  # else its answer has said so
+            self._put(record, record.label)
 
-    def _fact(self, record: m.AuditRecord) -> Fact:
-        waited = self._system.age_of(record.event_id)
-        return Fact.of_record(record, self._system.clock.now, waited)
-
+    @override
     def _note(self, what: str, client: str, line: Asked, outcome: str, text: str) -> None:
         asked = self._asked.pop(str(line["id"]), None)
         if asked is None:
             super()._note(what, client, line, outcome, text)
         elif asked.record is not None:
-            fact = replace(self._fact(asked.record), label=self._author(client))
-            words = line.get("text") or line.get("kind")
-            self.decided(replace(fact, text=words, mode=line.get("mode")))
+            self._put(asked.record, self._author(client))
         else:
             self._note_answer(asked, client, line, outcome, text)
+
+    def _put(self, record: m.AuditRecord, author: str) -> None:
+        arguments: Asked = {
+            "task": record.task,
+            "mode": record.dispatch_mode,
+            "operator": record.operator and self._label(record.operator),
+            "arrival_s": record.arrival_in,
+            "waited_s": self._system.age_of(record.event_id),
+        }
+        details: Asked = {
+            key: _short(value) for key, value in arguments.items() if value is not None
+        }
+        if record.action == "assign":
+            details["advised"] = record.advised and self._label(record.advised)
+            details["advised_s"] = _short(record.advised_in)
+        if record.code != m.OK:
+            details["code"] = record.code
+        self.keeper.put(
+            self.keeper.entry(
+                record.action.replace("_", " "),
+                author,
+                device=record.author,
+                role=record.role or "",
+                event=record.event_id,
+                subject=(record.device and self._label(record.device)) or "",
+                cause=record.reason,
+                outcome=DONE if record.code == m.OK else REFUSAL,
+                text=": ".join(text for text in (record.note, record.text) if text),
+                details=details,
+            )
+        )
 
     def _note_answer(
         self, asked: AskedDecision, client: str, line: Asked, outcome: str, text: str
@@ -128,14 +157,14 @@ class RemoteAudit(Audited):
             self.keeper.entry(
                 asked.action.replace("_", " "),
                 self._author(client),
-                device=self._system.device.id_tag,
+                device=self._room(client) or "",
                 role=self._system.role,
                 event=asked.event,
                 subject=self._label(str(line.get("device", ""))),
                 cause=str(line.get("reason") or ""),
                 outcome=outcome,
                 text=": ".join(word for word in (line.get("text"), text) if word),
-                details=values if waited is None else values | {"waited_s": round(waited, 3)},
+                details=values if waited is None else values | {"waited_s": _short(waited)},
             )
         )
 
@@ -143,3 +172,8 @@ class RemoteAudit(Audited):
 def _action(what: str) -> str:
     """Return the DVA's name for an action of a page."""
     return "set_dispatch" if what == "dispatch_mode" else what.removeprefix("event_")
+
+
+def _short(value: Any) -> Any:
+    """Return a time to the millisecond; all else as it is."""
+    return round(value, 3) if isinstance(value, float) else value
