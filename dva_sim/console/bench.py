@@ -47,6 +47,9 @@ class Bench(Protocol):
         decide.
         """
 
+    def forget(self, device: str, then: Callable[[], object] = do_nothing) -> None:
+        """Have the DVA forget a device at once, and call `then` once it has."""
+
 
 UNATTENDED: Final = ControlRoomRole.DRIVE  # of a control room at which nobody decides
 NOT_HERE: Final = "this console is attached to a DVA that runs elsewhere: that cannot be done here"

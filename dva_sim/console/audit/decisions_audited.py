@@ -10,19 +10,39 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Unpack
+from typing import Any, Final, Protocol, Unpack
 
 from typing_extensions import override
 
 from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import DONE, Audited
-from dva_sim.console.system.known_system import KnownSystem
 from dva_sim.console.wire.actions import ACTIONS, Asked, Audit
 from dva_sim.console.wire.seats import REFUSAL, Answered
+from dva_sim.network.realtime import PacedClock
 from dva_sim.protocol import messages as m
 
 RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
+
+
+class DecidingSystem(Protocol):
+    """System on which people decide, as far as rows tell of it.
+
+    Attributes:
+        clock: Clock of the console.
+    """
+
+    clock: PacedClock
+
+    @property
+    def role(self) -> str:
+        """Role that the DVA grants this console."""
+
+    def named(self, given: str) -> str:
+        """Return the name of a device by its id."""
+
+    def age_of(self, event: int | None) -> float | None:
+        """Return how long ago an event was first reported [s]."""
 
 
 @dataclass
@@ -62,7 +82,7 @@ class DecisionAudit(Audited):
     def __init__(
         self,
         keeper: AuditKeeper,
-        system: KnownSystem,
+        system: DecidingSystem,
         author: Callable[[str], str],
         room: Callable[[str], str | None],
     ) -> None:

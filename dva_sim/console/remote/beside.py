@@ -119,6 +119,9 @@ class PageBeside:
                 return True, f"the server listens on {port.address}"
         except NetworkError as error:
             return False, str(error)
+        if line["what"] == "forget":
+            self._dva.agent.dismiss(line["device"])
+            return True, ""
         self._dva.appoint(line["room"], ControlRoomRole(line["role"]))
         return True, ""
 

@@ -83,6 +83,10 @@ class PipedBench:
         self._roles[room] = role
         self._ask("appoint", lambda *_: then(), room=room, role=role)
 
+    def forget(self, device: str, then: Callable[[], object] = do_nothing) -> None:
+        """Implement `Bench`."""
+        self._ask("forget", lambda *_: then(), device=device)
+
     def _ask(self, what: str, then: Callable[[bool, str], object], **more: Any) -> None:
         number = next(self._numbers)
         self._asked[number] = then

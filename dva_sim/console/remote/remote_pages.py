@@ -35,6 +35,7 @@ from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, phone_profile, site_of
 
 FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
+SPEAKS_NO_MORE: Final = "speaks no more: the DVA takes it from its list within some seconds"
 READ_REQUESTS: Final = 0.1  # from one look at the DVA's log of requests to the next [s]
 
 
@@ -191,9 +192,14 @@ class RemotePages(ConsolePages):
                 device in (DVA, system.device.id_tag) or device in system.state.devices
             ),
             id_of=lambda number: (id_of("fake", number), NOWHERE.format(number % 250 + 1)),
-            dismiss=do_nothing,  # the DVA there finds out by itself that it is silent
-            removed="speaks no more: the DVA takes it from its list within some seconds",
+            dismiss=self._dismiss,
+            removed="is removed" if system.bench is not None else SPEAKS_NO_MORE,
         )
+
+    def _dismiss(self, device: str) -> None:
+        """Have the DVA forget a device; one elsewhere finds out by itself that it is silent."""
+        if (bench := self.system.bench) is not None:
+            bench.forget(device, lambda: self.system.state.forget(device))
 
     @override
     def hear_record(self, record: m.AuditRecord) -> None:

@@ -143,3 +143,18 @@ def test_the_dva_relies_on_nobody_once_the_last_page_is_gone(page):
     page.ask("room_join", name="ana")
     page.actions.take({"do": "release", "id": f"{BYE}c1", "client": "c1", "role": "supervise"})
     assert page.system.bench.asked == ["supervise", "drive"]
+
+
+def test_a_fake_device_that_is_removed_is_on_no_list_at_once(page):
+    page.actions.take({"do": "look", "logs": {}, "tables": ["devices"]})
+
+    def listed() -> set[str]:
+        return {row["id"] for line in page.lines_of("devices")[-1:] for row in line["devices"]}
+
+    ghost = page.ask("fake_add", label="ghost", type="Robot")["device"]
+    page.until(lambda: ghost in listed())
+    assert page.ask("fake_remove", device=ghost)["ok"]
+    page.let(1.1)
+    assert ghost not in listed()
+    page.let(5.0)
+    assert ghost not in listed()

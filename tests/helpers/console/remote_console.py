@@ -115,7 +115,8 @@ class NotedBench:
     """A bench that appoints the console of a page, and notes what is asked of it."""
 
     def __init__(self, page: RemotePage) -> None:
-        self._roles = page.world.world.run.dva.core.roles
+        self._dva = page.world.world.run.dva
+        self._roles = self._dva.core.roles
         self._own = page.system.device.id_tag
         self.asked: list[str] = []
 
@@ -135,6 +136,10 @@ class NotedBench:
         assert room == self._own
         self.asked.append(str(role))
         self._roles.appoint(room, role)
+        then()
+
+    def forget(self, device: str, then: Any = do_nothing) -> None:
+        self._dva.dismiss(device)
         then()
 
 
