@@ -29,7 +29,7 @@ LINES = re.findall(
     r"^\| (.+?) \| (.+?) \|$",
     DOCUMENT.read_text(encoding="utf-8").partition("## Line by line")[2].partition("\n## ")[0],
     re.MULTILINE,
-)[2:]
+)[1:]
 
 
 class Foreign(NamedTuple):
