@@ -8,7 +8,7 @@ from helpers.wording import counted
 from dva_sim.agents.robot.sensors import (
     FASTEST,
     LEASE,
-    MOST,
+    MAX_SUBSCRIPTIONS,
     SensorPort,
     SensorSubscriptions,
     sensor_topic,
@@ -130,7 +130,7 @@ def test_values_for_one_subscriber_do_not_reach_another(bench):
 
 
 def test_a_robot_serves_so_many_and_no_more(bench):
-    for number in range(MOST):
+    for number in range(MAX_SUBSCRIPTIONS):
         assert bench.subscribe(0.1, who=f"02:00:00:03:01:{number:02X}") == m.OK
     assert bench.subscribe(0.1, who=OTHER) == m.BUSY
 
