@@ -31,11 +31,11 @@ The answer holds `ok` and `text`. Actions that take something of their own, such
 seat without a request for ten minutes is given up. To drive, open `/ws/state`, whose first line
 names the client and its key, then `/ws/drive?key=KEY`, and send `input` 25 times a second."""
 _ROLES = {
-    Role.LOOK: "sees everything, changes nothing",
+    Role.LOOK: "sees everything, and may press the emergency stop",
     Role.PHONE: "drives one robot from a phone, or is a guard's phone",
-    Role.DRIVE: "drives robots and changes the link",
-    Role.DISPATCH: "also decides who is sent to events",
-    Role.SUPERVISE: "also takes robots from their holders",
+    Role.DRIVE: "drives robots, and changes the link and the run",
+    Role.DISPATCH: "also decides on events and alarms",
+    Role.SUPERVISE: "also takes robots from their holders, and says who decides",
 }
 _PLACES = {
     ActionPlace.WORLD: "simulation",
@@ -61,6 +61,7 @@ def page() -> str:
         "Every route but `/healthz` and `/trust` needs a token.",
         table(["request", "answer"], ([code(each), text] for each, text in routes())),
         "## Roles",
+        "Each may do what those before it may.",
         table(["role", "a client with it"], ([code(r.name.lower()), t] for r, t in _ROLES.items())),
         "## Actions",
         "An argument with `?` may be left out. Arguments that make no sense are answered with 400, "

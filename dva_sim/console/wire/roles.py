@@ -9,8 +9,8 @@ class Role(IntEnum):
     """The permissions of a client, in ascending order.
 
     Every role may press the emergency stop, which can do no more than stop robots. A phone drives
-    its own robot, or belongs to a guard. Drivers may change the link as well, dispatchers may send
-    others, and supervisors may take robots from their holders.
+    its own robot, or belongs to a guard. Drivers may change the link and the run as well,
+    dispatchers may decide on events, and supervisors may take robots from their holders.
     """
 
     NOBODY = 0

@@ -12,13 +12,16 @@ from helpers.paths import ROOT
 from dva_sim.console.asking.dispatcher import _KNOWN, ActionDispatcher
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
+from dva_sim.console.pages.processes import ROLES
 from dva_sim.console.simulator.robot_simulator import LoneRobotActions
+from dva_sim.console.web.actions import check_role
 from dva_sim.console.web.simulation import OutgoingLines
 from dva_sim.console.wire import generated
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Asked, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.console.wire.kinds import BadMessage, Kind, hints_of
 from dva_sim.console.wire.limits import LONG, PATIENCE
+from dva_sim.console.wire.roles import Role
 from dva_sim.network import realtime
 from dva_sim.recordings.audit_log import read_rows
 
@@ -89,6 +92,58 @@ def test_optional_arguments_say_what_would_be_right(action):
         with pytest.raises(BadMessage, match=f"{name} should be") as error:
             action.read(arguments_of(action) | {name: object()}, LABELS)
         assert "object" not in str(error.value)
+
+
+GRANTED = {  # what the docs say of each address: a phrase, and the actions that it means
+    "Look only": {"sees everything": "event_details", "press the emergency stop": "emergency"},
+    "Phone": {
+        "drives a robot": "start stop input samples gone release confirm refute decline sense "
+        "mission_order mission_cancel manual_release",
+        "that the DVA gives to the phone": "phone_register phone_devices phone_permission "
+        "phone_calibrate",
+        "reports events": "phone_report",
+        "is a guard": "guard_join guard_leave guard_answer guard_go guard_say guard_place "
+        "guard_report",
+    },
+    "Drive only": {
+        "takes free robots": "take tour tour_time",
+        "changes their patterns, the link and the pace": "pattern link pace",
+        "raises events": "event_raise event_proposal room_join",
+        "moves robots by hand and breaks them": "manual_take manual fault",
+        "starts and stops the DVA's server": "server_start server_stop fake_add fake_remove",
+        "marks moments": "mark",
+    },
+    "Dispatch only": {
+        "decides on events and alarms": "event_acknowledge event_assign event_take_off event_note "
+        "event_false_alarm event_escalate alarm_acknowledge alarm_shelve alarm_unshelve",
+        "sends robots by themselves": "mission mission_found",
+        "hands work over": "hand_over hand_over_answer",
+        "ticks instructions": "event_tick",
+        "releases robots after an emergency": "release_emergency",
+    },
+    "Console": {
+        "takes robots from others": "take_over revoke",
+        "hands decisions to people or to the policy": "dispatch_mode",
+    },
+}
+ADDRESSES = {"Console": "supervise", "Phone": "phone", **dict(ROLES)}
+BULLET = re.compile(r"^- `([^`]+):` (.*?[;.]$)", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_the_docs_say_of_each_address_what_it_may_do_and_nothing_else(address):
+    guide = (ROOT / "docs/how-to/control-room.md").read_text(encoding="utf-8")
+    said = {name: " ".join(text.split()) for name, text in BULLET.findall(guide)}
+    phrases, role = GRANTED[address], Role[ADDRESSES[address].upper()]
+    assert said.keys() == ADDRESSES.keys()
+    assert [phrase for phrase in phrases if phrase not in said[address]] == []
+    at_a_run = ActionPlace.WORLD | ActionPlace.REMOTE
+    own = {one.name for one in ACTIONS.values() if one.role is role and one.at & at_a_run}
+    assert set(" ".join(phrases.values()).split()) == own
+    for name in own:
+        check_role(role, name)
+        with pytest.raises(BadMessage):
+            check_role(Role(role - 1), name)
 
 
 @pytest.fixture(scope="module")
