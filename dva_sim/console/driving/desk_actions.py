@@ -17,14 +17,14 @@ from dva_sim.console.driving.drive_actions import Driving
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.events.decisions import moment_ms, why
 from dva_sim.console.events.handing_over import Offer, client_named
+from dva_sim.console.views.event_details import details_shown
 from dva_sim.console.wire.arguments import DetailsAsked, HandOverAsked, OfferAnswered, TickAsked
-from dva_sim.console.wire.events import DetailsShown, InstructionShown, StepShown
+from dva_sim.console.wire.events import InstructionShown
 from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.instructions import Instruction, read_instructions
 
-NEWEST: Final = 40  # steps of all events together that a shift begins with
 AFTER_RELEASE: Final = 1.0  # from giving robots back to asking for them again [s]
 
 Ticks = dict[tuple[int, int], tuple[str, float]]  # who and when [s], by event and step
@@ -75,37 +75,9 @@ class DeskActions:
     def _details(self, _: str, line: DetailsAsked, on_result: OnResult) -> None:
         number = line.get("event")
         histories = self._rooms.listener.histories
-        if number is None:
-            steps = [step for each in histories for step in self._steps(each)]
-            steps.sort(key=lambda step: step["at_ms"])
-            newest = DetailsShown(event=None, history=steps[-NEWEST:], instructions=[])
-            on_result(True, "", details=newest)
-        elif number in histories:
-            on_result(
-                True,
-                "",
-                details={
-                    "event": number,
-                    "history": self._steps(number),
-                    "instructions": [*self._numbered(number)],
-                },
-            )
-        else:
-            raise Refused(f"there is no event {number}")
-
-    def _steps(self, event: int) -> list[StepShown]:
-        history = self._rooms.listener.histories[event]
-        return [
-            {
-                "event": event,
-                "at_ms": moment_ms(step.time),
-                "what": step.what,
-                "who": step.who,
-                "device": self._system.label_of(step.device) if step.device else "",
-                "reason": step.reason,
-            }
-            for step in history.steps
-        ]
+        instructions = self._numbered(number) if number in histories else ()
+        details = details_shown(number, histories, self._system.label_of, instructions)
+        on_result(True, "", details=details)
 
     def _lines(self, event: int) -> Sequence[Instruction]:
         return self._instructions.get(self._rooms.listener.events[event].kind, ())

@@ -22,8 +22,10 @@ from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
+from dva_sim.console.views.event_details import details_shown
 from dva_sim.console.wire.actions import ActionPlace
 from dva_sim.console.wire.arguments import (
+    DetailsAsked,
     LogsLooked,
     MomentAsked,
     PaceChange,
@@ -344,6 +346,15 @@ class Player:
         self.clock.pace(paused=False)
         self._tell_scene()
         on_result(True, f"{path.name} is played")
+
+    @does("event_details")
+    def _details(self, _: str, line: DetailsAsked, on_result: OnResult) -> None:
+        if self.run is None:
+            raise Refused("No recording is played.")
+        labels = self.run.playback.labels
+        histories = self.run.histories(self.now)
+        details = details_shown(line.get("event"), histories, lambda who: labels.get(who, who))
+        on_result(True, "", details=details)
 
     @does("watch")
     def _watch(self, _: str, line: RobotsWatched) -> None:

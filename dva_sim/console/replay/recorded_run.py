@@ -10,6 +10,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from dva_sim.agents.control_room.history import EventHistory
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
 from dva_sim.console.dva.device_rows import device_row
@@ -356,6 +357,21 @@ class RecordedRun:
             for status in statuses_at(playback.events, playback.facts, now)
         ]
         return {"k": "events", "t": _ms(now), "events": lines}
+
+    def histories(self, now: float) -> dict[int, EventHistory]:
+        """Return the histories of events, as a control room would have heard them by then."""
+        found: dict[int, EventHistory] = {}
+        for event in self.playback.events:
+            facts = [fact for fact in self.playback.facts if fact.event == event.number]
+            moments = {*event.times.values(), *(fact.time for fact in facts)}
+            for moment in sorted(time for time in moments if time <= now + ROUNDED):
+                history = found.setdefault(event.number, EventHistory())
+                for status in statuses_at([event], facts, moment):
+                    history.hear_status(status, moment)
+                for fact in facts:
+                    if fact.time == moment:
+                        history.hear_record(fact.record(), moment)
+        return found
 
     def story(self, now: float) -> StorySoFarLine:
         """Return the story up to a moment."""

@@ -385,7 +385,7 @@ _LIST = (
         "event_details",
         "asks for the history of events, and for instructions",
         DetailsAsked,
-        at=_RUN,
+        at=_RUN | ActionPlace.REPLAY,
         role=Role.LOOK,
         audit="only reads what has happened",
     ),

@@ -21,6 +21,7 @@ MESSAGES = (
     *(b"<GetProposal>", b"<Acknowledge>", b"<Assign>", b"<Revoke>", b"<Assign>"),
     *(b"<PermissionRequest>", b"<StartTeleOp", b"<SetTeleOp>", b"<Finding>confirmed<"),
 )
+STEPS = "reported", "acknowledge", "assign", "confirmed"
 ROWS = (
     "begin",
     "acknowledge",
@@ -72,6 +73,8 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     expect(page.get_by_role("region", name="Event in hand")).to_contain_text("assign by supervise")
     picture = page.get_by_role("region", name=f"Picture of {label}")
     expect(picture).to_contain_text("held by operator-1", timeout=1000 * PATIENCE_S)
+    # What another operator's robot finds is not this person's to say.
+    expect(page.get_by_role("button", name="Confirm")).to_have_count(0)
     page.get_by_label("Reason or note").fill("I drive it there by hand")
     page.get_by_role("button", name=f"Take over {label}").click()
 

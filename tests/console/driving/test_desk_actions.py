@@ -1,5 +1,6 @@
 """The desk: history and instructions of events, and work that people hand over to each other."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,8 @@ import pytest
 from helpers.console.simulated_phone import FIRE, PhonePage
 
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.replay.recorded_run import RecordedRun
+from dva_sim.recordings.reading import Opened
 
 STEPS = "# Fire\nPeople first.\n- [ ] Ring 112\n- Close the doors\n"
 
@@ -75,6 +78,24 @@ def test_the_history_of_an_event_says_who_did_what(desk):
     assert desk.do("mission_found", event=1, finding="confirmed")[0]
     desk.let(0.5)
     assert ("confirmed", "", "robot-1") in happened(desk)
+
+
+def test_a_recording_has_the_same_history(desk):
+    about = {"event": 1, "decisions": None}
+    assert desk.do("event_acknowledge", event=1)[0]
+    assert desk.do("event_note", event=1, text="smoke")[0]
+    assert desk.do("mission", robot="robot-1", role="supervise", reason="nearest", **about)[0]
+    desk.let(5.0)
+    assert desk.do("event_false_alarm", reason="toast", **about)[0]
+    desk.let(0.5)
+    run = desk.world.run
+    playback = replace(run.recording(), events=[run.dva.core.events.get(1)])
+    run_so_far = RecordedRun(Opened(playback, {}, None, 0.0), "desk")
+    recorded = run_so_far.histories(run.clock.now)
+    steps = [(step.what, step.who, step.reason) for step in recorded[1].steps]
+    assert len(steps) == 5
+    live = details(desk, event=1)["history"]
+    assert steps == [(step["what"], step["who"], step["reason"]) for step in live]
 
 
 def test_a_shift_begins_with_the_newest_steps_of_all_events(desk):

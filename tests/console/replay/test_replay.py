@@ -89,6 +89,27 @@ def test_events_come_back_as_the_dva_knew_them(files):
     ]
 
 
+def test_the_history_of_an_event_is_told_up_to_the_moment(recorded, playing):
+    page = playing(recorded)
+    page.ask("pace", paused=True)
+    page.ask("seek", "s1", t_ms=64_000)  # events are assigned as soon as they are reported
+    first = page.ask("event_details", "d1", event=1)["details"]["history"]
+    assert [(step["what"], step["at_ms"]) for step in first] == [
+        ("reported", 64_000),
+        ("assigned", 64_000),
+    ]
+    assert first[1]["device"] == "guard-1"
+    assert page.ask("event_details", "d2", event=2)["text"] == "there is no event 2"
+    page.ask("seek", "s2", t_ms=90_000)
+    newest = page.ask("event_details", "d3")["details"]["history"]
+    assert [step["event"] for step in newest] == [1, 1, 2, 2]
+
+
+def test_without_a_recording_there_is_no_history(files, playing):
+    page = playing(None, Shelf(files))
+    assert page.ask("event_details", event=1)["text"] == "No recording is played."
+
+
 def test_everybody_is_where_the_run_had_them(recorded):
     for label, track in drill().recorder.tracks.items():
         for point in track[:: max(1, len(track) // 7)]:
