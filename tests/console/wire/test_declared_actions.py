@@ -99,24 +99,23 @@ GRANTED = {  # what the docs say of each address: a phrase, and the actions that
     "Phone": {
         "drives a robot": "start stop input samples gone release confirm refute decline sense "
         "mission_order mission_cancel manual_release",
-        "that the DVA gives to the phone": "phone_register phone_devices phone_permission "
-        "phone_calibrate",
+        "that the DVA gives it": "phone_register phone_devices phone_permission phone_calibrate",
         "reports events": "phone_report",
         "is a guard": "guard_join guard_leave guard_answer guard_go guard_say guard_place "
         "guard_report",
     },
     "Drive only": {
         "takes free robots": "take tour tour_time",
-        "changes their patterns, the link and the pace": "pattern link pace",
+        "sets pattern, link and pace": "pattern link pace",
         "raises events": "event_raise event_proposal room_join",
-        "moves robots by hand and breaks them": "manual_take manual fault",
-        "starts and stops the DVA's server": "server_start server_stop fake_add fake_remove",
+        "moves and breaks robots by hand": "manual_take manual fault",
+        "runs the DVA's server": "server_start server_stop fake_add fake_remove",
         "marks moments": "mark",
     },
     "Dispatch only": {
         "decides on events and alarms": "event_acknowledge event_assign event_take_off event_note "
         "event_false_alarm event_escalate alarm_acknowledge alarm_shelve alarm_unshelve",
-        "sends robots by themselves": "mission mission_found",
+        "sends robots": "mission mission_found",
         "hands work over": "hand_over hand_over_answer",
         "ticks instructions": "event_tick",
         "releases robots after an emergency": "release_emergency",
