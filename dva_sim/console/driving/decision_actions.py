@@ -180,11 +180,11 @@ class DecisionActions:
 
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
-        """Take a robot and its task from its driver into the client's own seat."""
+        """Take a robot from its driver, with its task or for another, into the client's seat."""
         robot = self._driving.robot(line["robot"])
-        events = self._rooms.listener.events.values()
-        sent = (e for e in events if e.closed_for is None and e.responder == robot)
-        event = next(sent, None)
+        events = self._rooms.listener.events
+        sent = (e for e in events.values() if e.closed_for is None and e.responder == robot)
+        event = events.get(line["event"]) if "event" in line else next(sent, None)
 
         def begin(agent: ControlRoomAgent, on_result: OnResult) -> None:
             self._driving.take_over(

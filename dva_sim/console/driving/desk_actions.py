@@ -163,7 +163,7 @@ class DeskActions:
     @does("hand_over_answer")
     def _answer(self, client: str, line: OfferAnswered, on_result: OnResult) -> None:
         """Take over what a colleague offers, or decline it."""
-        offer = self._rooms.handing_over.answer(line["offer"], client)
+        offer = self._rooms.handing_over.answer(line["offer"], client, line["accept"])
         device = self._rooms.listener.device
         if not line["accept"]:
             device.tell(f"{offer.to} declines {offer.described()} of {offer.sender}", "order")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from dva_sim.console.asking.refusal import Refused
@@ -28,6 +28,7 @@ class Offer:
         note: Words for the colleague.
         whole: True if it is all that the person had in hand.
         at: Time of the offer [s].
+        accepted: Answer of the colleague; None until there is one.
     """
 
     sender: str
@@ -39,6 +40,12 @@ class Offer:
     note: str
     whole: bool
     at: float
+    accepted: bool | None = None
+
+    @property
+    def awaited_by(self) -> str:
+        """Page for which it is: of the colleague, and once answered of the sender."""
+        return self.client if self.accepted is None else self.sender_client
 
     def described(self) -> str:
         """Describe the work in words."""
@@ -59,28 +66,27 @@ class HandingOver:
         self._count = 0
 
     def offer(self, offer: Offer) -> None:
-        """Offer work; an older offer between the same two is replaced."""
+        """Offer work; it replaces an older offer between the same two, and answered ones."""
         pair = offer.sender_client, offer.client
         for number, old in list(self._offers.items()):
-            if (old.sender_client, old.client) == pair and (
-                old.whole or old.events == offer.events
-            ):
+            is_alike = old.whole or old.events == offer.events or old.accepted is not None
+            if (old.sender_client, old.client) == pair and is_alike:
                 del self._offers[number]
         self._count += 1
         self._offers[self._count] = offer
         if len(self._offers) > MOST_OFFERS:
             del self._offers[next(iter(self._offers))]
 
-    def answer(self, number: int, client: str) -> Offer:
-        """Take an offer that a page answers off the list.
+    def answer(self, number: int, client: str, accepted: bool) -> Offer:
+        """Note the answer of a page to an offer, which its sender sees until the next one.
 
         Raises:
             Refused: there is none for this page.
         """
         offer = self._offers.get(number)
-        if offer is None or offer.client != client:
+        if offer is None or offer.client != client or offer.accepted is not None:
             raise Refused("that offer is over")
-        del self._offers[number]
+        self._offers[number] = replace(offer, accepted=accepted)
         return offer
 
     def give(self, event: int, to: str) -> None:
@@ -90,8 +96,8 @@ class HandingOver:
             del self.owners[next(iter(self.owners))]
 
     def shown(self, present: Collection[str]) -> list[OfferShown]:
-        """Return the offers; those to pages that are gone are withdrawn."""
-        self._offers = {n: offer for n, offer in self._offers.items() if offer.client in present}
+        """Return the offers but those to, or once answered those of, pages that are gone."""
+        self._offers = {n: o for n, o in self._offers.items() if o.awaited_by in present}
         return [_shown(number, offer) for number, offer in self._offers.items()]
 
     def owners_shown(self) -> list[OwnerShown]:
@@ -110,6 +116,7 @@ def _shown(number: int, offer: Offer) -> OfferShown:
         "note": offer.note,
         "whole": offer.whole,
         "at_ms": moment_ms(offer.at),
+        "accepted": offer.accepted,
     }
 
 

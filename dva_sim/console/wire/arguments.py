@@ -316,9 +316,10 @@ class FindingAsked(OfEvent):
 
 
 class TakeoverAsked(OfRobot):
-    """A robot, and why it is taken."""
+    """A robot, why it is taken, and the event to drive it to; without one its own, if any."""
 
     reason: Annotated[str, Text(1, 256)]
+    event: NotRequired[EventNumber]
 
 
 class OfAlarm(TypedDict):

@@ -105,7 +105,7 @@ class OfferShown(TypedDict):
     """Work that somebody offers to a colleague.
 
     `sender` and `to` are names of people, `client` the page of the colleague; `whole` is true where
-    all is handed over, at the end of a shift.
+    all is handed over, at the end of a shift, and `accepted` null until the colleague has answered.
     """
 
     number: int
@@ -117,6 +117,7 @@ class OfferShown(TypedDict):
     note: str
     whole: bool
     at_ms: int
+    accepted: bool | None
 
 
 class OwnerShown(TypedDict):

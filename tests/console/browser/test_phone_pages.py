@@ -121,3 +121,16 @@ def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(console, visi
     assert all(url.startswith(running.base) for url in weights)
     assert not any("leaflet" in url or "uplot" in url for url in weights)
     assert sum(weights.values()) < 200_000, sum(weights.values())
+
+
+def test_a_phone_says_that_the_dvas_server_is_stopped(console, visits):
+    at = console(*WORDS)
+    visit = visits(320, 568, has_touch=True, is_mobile=True)
+    page = visit.tab()
+    page.goto(at.phone)
+    visit.context.request.get(at.drive)
+    for action, arguments, count in (("server_stop", {}, 1), ("server_start", {"port": 5555}, 0)):
+        body = {"id": f"phone {action}", "action": action, "arguments": arguments}
+        assert visit.context.request.post(f"{at.base}api/actions", data=body).ok
+        warning = page.locator(".alerts").get_by_text("The DVA's server is stopped")
+        expect(warning).to_have_count(count)

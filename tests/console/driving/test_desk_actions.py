@@ -130,6 +130,14 @@ def test_a_step_that_is_not_there_is_refused(desk, event, step):
     assert not desk.do("event_tick", event=event, step=step, done=True)[0]
 
 
+def test_a_robot_that_a_person_drives_to_an_event_is_assigned_to_it(desk):
+    about = {"event": 1, "reason": "I know the way", "role": "supervise", "within": 60.0}
+    done, text = desk.do("take_over", robot="robot-1", **about)
+    assert done, text
+    assert row(desk)["state"] == "assigned"
+    assert row(desk)["assigned"] == ["robot-1", "console-1"]
+
+
 # --- handing over -----------------------------------------------------------------------------
 
 
@@ -144,7 +152,6 @@ def test_a_colleague_who_accepts_answers_for_the_event_and_its_robot(desk):
     done, text = answered(desk)
     assert done, text
     assert control(desk)["owners"] == [{"event": 1, "label": "ben"}]
-    assert control(desk)["offers"] == []
     assert row(desk)["assigned"] == ["robot-1", "ben"]
     assert row(desk)["note"] == "handed over by ana to ben: smoke already"
     desk.let(10.0)
@@ -188,6 +195,18 @@ def test_who_declines_changes_nothing(desk):
     assert answered(desk, accept=False)[0]
     assert control(desk)["owners"] == []
     assert any("ben declines event 1 of ana" in line["what"] for line in desk.lines_of("story"))
+
+
+def test_who_offers_sees_the_answer_until_the_next_offer_or_the_end_of_the_page(desk):
+    for accept in (False, True):
+        assert offered(desk, event=1)[0]
+        (offer,) = control(desk)["offers"]
+        assert offer["accepted"] is None
+        assert answered(desk, accept)[0]
+        (offer,) = control(desk)["offers"]
+        assert offer["accepted"] is accept
+    desk.actions.take({"id": "bye-release-a1", "client": "a1", "do": "release"})
+    assert control(desk)["offers"] == []
 
 
 @pytest.mark.parametrize(

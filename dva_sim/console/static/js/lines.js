@@ -170,7 +170,8 @@
 /**
  * Work that somebody offers to a colleague.
  * @typedef {{number: number, sender: string, to: string, client: string, events: number[],
- *   robots: string[], note: string, whole: boolean, at_ms: number}} Offer
+ *   robots: string[], note: string, whole: boolean, at_ms: number, accepted: boolean | null}}
+ *   Offer
  */
 /**
  * Person who answers for an event that was handed over.

@@ -61,10 +61,10 @@ function Instruction({ event, line, off }) {
     <span>${line.text}${line.done && html` <small>${line.done.label}, ${ageText(ageOf(line.done.at_ms))} ago</small>`}</span></label>`;
 }
 
-/** Steps in the order of their times. @param {{details: Details | null, numbered?: boolean}} props */
+/** Steps in the order of their times; of all events together the newest first. @param {{details: Details | null, numbered?: boolean}} props */
 export function History({ details, numbered = false }) {
   if (!details) return null;
-  const steps = details.history;
+  const steps = numbered ? [...details.history].reverse() : details.history;
   if (!steps.length) return html`<p class="none">Nothing has happened.</p>`;
   return html`<ol class="history">${steps.map((step) => html`<li key=${`${step.event} ${step.at_ms} ${step.what} ${step.device}`}>
     <span class="figure">${ageText(ageOf(step.at_ms))} ago</span>

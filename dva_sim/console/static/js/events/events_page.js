@@ -10,7 +10,7 @@ import { workByKeys } from './desk_keys.js';
 import { DeskHead } from './desk_head.js';
 import { DeskList } from './desk_list.js';
 import { EventPanel } from './event_panel.js';
-import { Offers, Shift } from './handing_over.js';
+import { Shift } from './handing_over.js';
 import { Raise } from './raise.js';
 import { onShift, ownName, raising } from './shared.js';
 import { Sight } from './sight.js';
@@ -23,7 +23,7 @@ export function EventsPage() {
     <h1 class="hidden">Events</h1>
     <div class="desk-list">${!isPast.value && html`<${DeskHead} join=${join} />`}<${DeskList} /></div>
     <${Sight} />
-    <div class="desk-panel"><${Offers} /><${Panel} /></div>
+    <div class="desk-panel"><${Panel} /></div>
   </main>`;
 }
 

@@ -1,12 +1,13 @@
 /** The shell: bar, rail, warnings, and the page named in the address. */
 import { html, render } from '../../vendor/preact.js';
 import {
-  clock, connection, isAttached, isPast, replay, rows, scene, shelf,
+  clock, connection, isAttached, isPast, replay, scene, shelf,
 } from '../store.js';
 import { AuditPage } from '../audit/audit_page.js';
 import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { EventsPage } from '../events/events_page.js';
+import { Offers } from '../events/handing_over.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
@@ -71,7 +72,7 @@ function App() {
   const Page = BODIES[shown()];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
-    <div class="body"><${Strip} /><${Warnings} /><${Tour} /><${ReplayBar} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
+    <div class="body"><${Strip} /><${Offers} /><${Warnings} /><${Tour} /><${ReplayBar} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
     <${Help} /><${PhoneCode} />`;
 }
 
@@ -130,18 +131,6 @@ function Warnings() {
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the simulation is lost. What you see is out of date. Robots you were driving
       have been stopped. Retrying …</p>`}
-    <${Silence} server=${rows.value?.server} />
     ${ended && html`<p class="warning">The simulation has ended: ${connection.value}</p>`}
   </div>`;
-}
-
-/** Says of a DVA elsewhere that it does not answer. @param {{server: any}} props */
-function Silence({ server }) {
-  if ((server?.hearing ?? 'answers') === 'answers') return null;
-  const text = server.own !== false && !server.listens
-    ? "The DVA's server is stopped. What you see is out of date. Start it on the page Main."
-    : server.hearing === 'never'
-      ? `No DVA has answered at ${server.address} since this console was started. Retrying …`
-      : `The DVA at ${server.address} is silent. What you see is out of date. Retrying …`;
-  return html`<p class="warning">${text}</p>`;
 }

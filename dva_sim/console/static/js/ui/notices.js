@@ -1,6 +1,6 @@
 /** Notices of every page: emergency stops, refusals, and data that is out of date. */
 import { html } from '../../vendor/preact.js';
-import { thingAt, notice } from '../store.js';
+import { notice, rows, thingAt } from '../store.js';
 import { giveUp, refused, stopped, unconfirmed } from '../net/emergency.js';
 import { isStale, newestTime } from '../net/world_time.js';
 import { EmergencyBar } from './emergency_bar.js';
@@ -9,7 +9,7 @@ import { clockText } from './words.js';
 
 /** @param {{others?: any[]}} props `others` are texts that the page shows itself */
 export function Notices({ others = [] }) {
-  return html`<${EmergencyBar} /><${EmergencyReport} /><${Silence} />
+  return html`<${EmergencyBar} /><${EmergencyReport} /><${Silence} /><${DvaSilence} />
     ${notice.value && !others.includes(notice.value) && html`<${Note} text=${notice.value} onDismiss=${() => (notice.value = '')} />`}`;
 }
 
@@ -37,6 +37,18 @@ function stoppedText() {
 function Silence() {
   if (!isStale.value) return null;
   return html`<p class="warning silence">No data since ${clockText(newestTime())}. Greyed values are from then.</p>`;
+}
+
+/** Warning that the DVA does not answer, or that its server is stopped. */
+function DvaSilence() {
+  const server = /** @type {any} */ (rows.value?.server);
+  if ((server?.hearing ?? 'answers') === 'answers') return null;
+  const text = server.own !== false && !server.listens
+    ? "The DVA's server is stopped. What you see is out of date. Start it on the console's page Main."
+    : server.hearing === 'never'
+      ? `No DVA has answered at ${server.address} since this console was started. Retrying …`
+      : `The DVA at ${server.address} is silent. What you see is out of date. Retrying …`;
+  return html`<p class="warning">${text}</p>`;
 }
 
 /** @param {{text: string, onDismiss: () => void, look?: string}} props */
