@@ -40,9 +40,9 @@ function Age({ robot, trouble }) {
   const limit = Math.max(HATCHED_S, scene.value?.stale_s ?? 0);
   const look = !known || age > limit || isStale.value ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
   const silence = isStale.value ? `, no data for ${secondsTo(pageAge())}` : '';
-  const shown = known ? `${text}${silence}` : (isElsewhere ? '' : pictures.value) || trouble || 'waiting for the first picture';
+  const shown = known ? text : (isElsewhere ? '' : pictures.value) || trouble || 'waiting for the first picture';
   return html`<div class=${`veil ${look}`}></div>
-    <figcaption><span class=${`picture-age ${look}`}>${shown}</span></figcaption>`;
+    <figcaption><span class=${`picture-age ${look}`}>${shown}${silence}</span></figcaption>`;
 }
 
 /** Age of a picture whose time is known. @param {import('../lines.js').Thing} robot */

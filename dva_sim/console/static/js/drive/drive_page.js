@@ -1,7 +1,7 @@
 /** Driving page: one or two robots with their pictures, the map and latencies. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { connection, driveOf, seat, scene } from '../store.js';
-import { driveLost } from '../net/actions.js';
+import { ask, driveLost } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { LinkPanel } from '../network/link_panel.js';
 import { MapBox } from '../map/map_box.js';
@@ -62,6 +62,7 @@ function steering() {
   const ends = [driveByKeys(), driveByGamepad(), watchInterruptions()];
   return () => {
     interrupt('The page was left.');
+    if (seat.peek()?.phase === 'driving') ask('stop'); // else its watchdog stops it, and it counts as lost
     ends.forEach((end) => end());
   };
 }

@@ -54,7 +54,7 @@ function Card({ robot, isSeen }) {
   const at = tracks.last(robot.i);
   const lines = /** @type {[string, unknown][]} */ ([
     ['Place', at ? roomAt(at.x, at.y) : 'unknown'],
-    ['Task', taskOf(robot.label)],
+    ['Task', taskOf(robot.label) ?? (mode === 'Mission' ? 'a mission, not to an event' : 'none')],
     ['Held by', row?.holder_label || row?.holder || 'nobody'],
     ['Speed', at ? `${at.speed.toFixed(2)} m/s` : 'unknown'],
     ['Battery', row?.battery === null ? 'unknown' : percentText(row?.battery)],
@@ -71,5 +71,5 @@ function Card({ robot, isSeen }) {
 /** @param {string} label */
 function taskOf(label) {
   const event = eventsInOrder().find((one) => isOpen(one) && one.assigned.includes(label));
-  return event ? html`<a href="#/events" onClick=${() => select(event.number)}>${plain(event.kind)}, ${placeOf(event)}</a>` : 'none';
+  return event ? html`<a href="#/events" onClick=${() => select(event.number)}>${plain(event.kind)}, ${placeOf(event)}</a>` : null;
 }
