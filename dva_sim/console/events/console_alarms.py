@@ -138,7 +138,13 @@ class ConsoleAlarms:
             and alarm.condition.event is not None
             and alarm.condition.seen_by is None
             and key.startswith("event ")
+            and self._is_open(alarm.condition.event)
         }
+
+    def _is_open(self, event: int) -> bool:
+        """Return True unless an event is closed, as that of an alarm may be since the last look."""
+        status = self._agent.events.get(event)
+        return status is None or status.closed_for is None
 
     def acknowledge(self, key: str, by: str) -> None:
         """Note that somebody has seen an alarm."""

@@ -9,6 +9,7 @@ from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Page, expect
 
+from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.protocol.mistakes import check_message
 from dva_sim.recordings.audit_log import read_rows
 from dva_sim.recordings.reading import read_recording
@@ -96,7 +97,10 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
         checked = programs.start("check", file)
         assert checked.ends() == 0, checked.output + checked.complained
     in_order(ROWS, [row.action for row in read_rows(audit)])
-    sent = list(read_recording(record).playback.recorder.traffic or ())
+    opened = read_recording(record)
+    (history,) = RecordedRun(opened, record.name).histories(opened.lasted).values()
+    in_order(STEPS, [step.what for step in history.steps])
+    sent = list(opened.playback.recorder.traffic or ())
     reports = [one.payload for one in sent if isinstance(one.payload, bytes)]
     in_order(MESSAGES, reports)
     assert [found for data in reports for found in check_message(data)] == []

@@ -1,15 +1,14 @@
 /** Keys for the work at the desk; what sends somebody or takes a robot needs Shift. */
-import { act } from '../net/actions.js';
 import { mayDispatch, maySteer } from '../store.js';
 import { isWriting } from '../shell/keys.js';
 import { chooseCandidate } from './proposal.js';
-import { inHand, openEvents, select } from './shared.js';
+import { acknowledge, inHand, isUnseen, openEvents, select } from './shared.js';
 
 /** @type {Record<string, () => void>} */
 const DEEDS = {
   j: () => step(1),
   k: () => step(-1),
-  a: acknowledge,
+  a: acknowledgeInHand,
   S: () => press('send'),
   T: () => press('take'),
   r: () => document.getElementById('reason')?.focus(),
@@ -36,11 +35,9 @@ function step(by) {
   if (next !== undefined) select(next);
 }
 
-function acknowledge() {
+function acknowledgeInHand() {
   const event = inHand.peek();
-  if (event && !event.acknowledged && mayDispatch.peek() && maySteer.peek()) {
-    act('event_acknowledge', { event: event.number });
-  }
+  if (event && isUnseen(event) && mayDispatch.peek() && maySteer.peek()) acknowledge(event);
 }
 
 /** @param {string} deed of the button in the panel */

@@ -6,7 +6,8 @@ import { ageOf, sinceSent } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
 import { SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
-import { closedEvents, FILTERS, filter, inHand, openEvents, ownerOf, select, shelfOf } from './shared.js';
+import { RANKS } from '../shell/unseen.js';
+import { closedEvents, FILTERS, filter, inHand, isUnseen, openEvents, ownerOf, select, shelfOf } from './shared.js';
 import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -17,17 +18,17 @@ export function DeskList() {
   const { alarms, shelved, flood, rate } = alarmList.value;
   const open = openEvents.value;
   const newOnes = new Set(alarms.flatMap((alarm) => (alarm.is_new && alarm.event !== null ? [alarm.event] : [])));
-  const others = alarms.filter((alarm) => !events.value.some((event) => isOpen(event) && event.number === alarm.event));
-  const unseen = open.filter((event) => !event.acknowledged).length;
-  const empty = !open.length && !others.length;
+  const all = events.value.filter(isOpen);
+  const others = alarms.filter((alarm) => !all.some((event) => event.number === alarm.event));
+  const rows = [...others, ...open].sort((one, other) => rankOf(other) - rankOf(one));
   return html`<section aria-labelledby="events-heading">
-    <h2 id="events-heading">Events <span class="count">${open.length} open, ${unseen} not acknowledged</span></h2>
+    <h2 id="events-heading">Events <span class="count">${all.length} open, ${all.filter(isUnseen).length} not acknowledged</span></h2>
     <${Filters} />
     ${flood && html`<p class="flood" role="status">${rate} alarms in 10 minutes: similar ones are grouped.</p>`}
     <ul class="rows desk-rows reported" aria-label="Open events and alarms">
-      ${others.map((alarm) => html`<${SystemAlarm} key=${alarm.key} alarm=${alarm} />`)}
-      ${open.map((event) => html`<${Row} key=${event.number} event=${event} isNew=${newOnes.has(event.number)} />`)}</ul>
-    ${empty && html`<p class="none">${events.value.length ? 'No event is open.' : 'Nothing has been reported.'}</p>`}
+      ${rows.map((row) => ('key' in row ? html`<${SystemAlarm} key=${row.key} alarm=${row} />`
+        : html`<${Row} key=${row.number} event=${row} isNew=${newOnes.has(row.number)} />`))}</ul>
+    ${!rows.length && html`<p class="none">${all.length ? 'No open event is listed here.' : events.value.length ? 'No event is open.' : 'Nothing has been reported.'}</p>`}
     ${shelved.length > 0 && html`<details open><summary>Shelved (${shelved.length})</summary>
       <ul class="rows">${shelved.map((alarm) => html`<${Shelved} key=${alarm.key} alarm=${alarm} />`)}</ul></details>`}
     ${closedEvents.value.map(([ending, list]) => html`<details key=${ending}>
@@ -36,6 +37,11 @@ export function DeskList() {
         ${list.map((event) => html`<${Row} key=${event.number} event=${event} />`)}</ul></details>`)}
   </section>`;
 }
+
+/** Rank in the list: by severity; last is what is over. @param {SiteEvent | AlarmRow} row */
+const rankOf = (row) => ('key' in row ? row.state === 'returned' ? -1 : RANKS.indexOf(row.priority) : RANKS.indexOf(row.severity));
+
+const STATES = /** @type {Record<string, string>} */ ({ unacknowledged: 'not acknowledged', returned: 'over, not acknowledged' });
 
 function Filters() {
   return html`<div class="chips" role="group" aria-label="Shown events">${FILTERS.map((name) => html`<button
@@ -48,7 +54,7 @@ function Row({ event, isNew = false }) {
   const mine = inHand.value?.number === event.number;
   const what = `${capital(plain(event.kind))}, ${event.room || 'outdoors'}`;
   const age = event.over ? '' : ageText(ageOf(event.since_ms));
-  const look = [event.over ? 'over' : event.acknowledged ? 'acknowledged' : 'unacknowledged', isNew && 'new'];
+  const look = [event.over ? 'over' : isUnseen(event) ? 'unacknowledged' : 'acknowledged', isNew && 'new'];
   return html`<li class=${`desk-row ${look.filter(Boolean).join(' ')}`} data-event=${event.number}>
     <button type="button" class="row" aria-pressed=${mine} onClick=${() => select(event.number)}>
       <${SeverityMark} severity=${event.severity} quiet=${event.over} />
@@ -72,7 +78,7 @@ function SystemAlarm({ alarm }) {
     <button type="button" class="plain text" disabled=${alarm.event === null}
       onClick=${() => select(alarm.event ?? 0)}>${alarm.text}</button>
     <b>${ageText(ageOf(alarm.since_ms))}</b>
-    <span class="soft">${alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
+    <span class="soft">${STATES[alarm.state] ?? alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
     ${mayDispatch.value && html`<span class="do">${!seen && html`<button type="button" key="seen" disabled=${busy}
         aria-label=${`Acknowledge: ${alarm.text}`} onClick=${acknowledge}>Acknowledge</button>`}
       <${Shelve} alarm=${alarm} /></span>`}

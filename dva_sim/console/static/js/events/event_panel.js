@@ -1,6 +1,6 @@
 /** Event in hand: its state, who could go, one button for what is next, and the other decisions. */
-import { html, signal, useEffect, useRef, useState } from '../../vendor/preact.js';
-import { alarmList, control, mayDispatch, maySteer, maySupervise, selection, thingNamed } from '../store.js';
+import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
+import { alarmList, control, isAttached, mayDispatch, maySteer, maySupervise, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -9,8 +9,8 @@ import { SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { History, Instructions, useDetails } from './details.js';
 import { HandOver } from './handing_over.js';
-import { assignTo, candidateOf, chosen, estimateOf, ProposalPanel, waysOf } from './proposal.js';
-import { inHand, ownerOf, ownRoom, reason, shelfOf } from './shared.js';
+import { assignTo, candidateOf, chosen, estimateOf, isPicked, ProposalPanel, waysOf } from './proposal.js';
+import { acknowledge, inHand, isUnseen, ownerOf, ownRoom, reason, seeDecided, shelfOf } from './shared.js';
 import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -68,7 +68,9 @@ function Decisions({ event }) {
   const about = { event: event.number, decisions: event.decisions ?? null };
   const tell = (/** @type {Done} */ done) => {
     setResult(done.ok ? done.text : '');
-    if (done.ok) reason.value = '';
+    if (!done.ok) return;
+    reason.value = '';
+    seeDecided(event);
   };
   const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more) =>
     tell(await act(what, more));
@@ -104,19 +106,19 @@ function Decisions({ event }) {
 const WAYS = /** @type {Record<string, string>} */ ({
   order: 'by the DVA’s order', mission: 'by itself', drive: 'I drive',
 });
-const wayWanted = signal('');
 
 /** Next step of an open event: sending the chosen candidate, or acknowledging. @param {{event: SiteEvent, tell: (done: Done) => void}} props */
 function NextStep({ event, tell }) {
   const whom = chosen.value;
   const ways = waysOf(candidateOf(whom));
-  const way = ways.includes(wayWanted.value) ? wayWanted.value : ways[0];
-  const isSent = sentTo(event).includes(whom);
-  const settled = useSettled(`${event.number} ${Boolean(whom)}`);
+  const [wanted, want] = useState('');
+  const way = ways.includes(wanted) ? wanted : ways[0];
+  const sent = sentTo(event);
+  const isSent = sent.includes(whom);
+  const settled = useSettled(`${event.number} ${isPicked.value || whom}`);
   const off = !maySteer.value;
-  const acknowledge = async () => tell(await act('event_acknowledge', { event: event.number }));
   const send = async () => {
-    if (way === 'drive') return tell(await drive(whom, reason.peek().trim()));
+    if (way === 'drive') return tell(await drive(whom, reason.peek().trim(), event.number));
     const about = { event: event.number, decisions: event.decisions ?? null, reason: reason.peek().trim() };
     if (way === 'mission') return tell(await act('mission', { robot: whom, ...about }));
     return tell(await assignTo(event, whom));
@@ -124,18 +126,19 @@ function NextStep({ event, tell }) {
   const find = async (/** @type {string} */ finding) =>
     tell(await act('mission_found', { event: event.number, finding }));
   const looks = isOwnMission(event);
+  const isNext = Boolean(whom) && !sent.length; // to send another one takes the first one off
   return html`<div class="next-step">
     ${looks && html`<div class="buttons" role="group" aria-label="Finding">
       <button type="button" class="primary" disabled=${off} onClick=${() => find('confirmed')}>Confirm</button>
       <button type="button" disabled=${off} onClick=${() => find('refuted')}>Refute</button></div>`}
     ${ways.length > 1 && !isSent && html`<fieldset><legend class="hidden">How</legend>${ways.map((one) => html`<label key=${one}>
-      <input type="radio" name="way" checked=${one === way} onInput=${() => (wayWanted.value = one)} />${WAYS[one]}</label>`)}</fieldset>`}
+      <input type="radio" name="way" checked=${one === way} onInput=${() => want(one)} />${WAYS[one]}</label>`)}</fieldset>`}
     <div class="buttons">
-      ${whom && !isSent && html`<button type="button" key="send" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off || !settled} onClick=${send}>
-        ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom)}`}</button>`}
-      ${!whom && !sentTo(event).length && html`<p class="none">Nobody can go.</p>`}
-      ${!event.acknowledged && html`<button type="button" key="acknowledge" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}
-        onClick=${acknowledge}>Acknowledge</button>`}
+      ${whom && !isSent && html`<button type="button" key="send" class=${isNext ? 'primary' : ''} data-deed="send" disabled=${off || !settled} onClick=${send}>
+        ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom, sent[0])}`}</button>`}
+      ${!whom && !sent.length && html`<p class="none">Nobody can go.</p>`}
+      ${isUnseen(event) && html`<button type="button" key="acknowledge" class=${looks || isNext ? '' : 'primary'} disabled=${off}
+        onClick=${async () => tell(await acknowledge(event))}>Acknowledge</button>`}
     </div></div>`;
 }
 
@@ -152,10 +155,16 @@ function useSettled(key) {
   return settled === key;
 }
 
-/** Take a robot from its holder, with its task, and open its driving page. @param {string} robot @param {string} words */
-async function drive(robot, words) {
+/**
+ * Take a robot from its holder, with its task or to an event, and open its driving page.
+ * @param {string} robot
+ * @param {string} words
+ * @param {number} [event]
+ */
+async function drive(robot, words, event) {
   if (maySupervise.peek()) {
-    const done = await act('take_over', { robot, reason: words || 'taken over by hand' });
+    const to = event === undefined ? {} : { event };
+    const done = await act('take_over', { robot, reason: words || 'taken over by hand', ...to });
     if (!done.ok) return done;
   }
   selection.value = null;
@@ -163,9 +172,10 @@ async function drive(robot, words) {
   return { ok: true, text: '' };
 }
 
-/** True where a robot looks by itself for this page's person, as far as labels tell. @param {SiteEvent} event */
+/** True where a robot looks by itself for this page's person; at a remote DVA, as far as labels tell. @param {SiteEvent} event */
 function isOwnMission(event) {
   const senders = event.assigned.filter((who) => !thingNamed(who));
+  if (!isAttached.value) return event.assigned.some(isRobot) && senders.includes(ownRoom.value);
   const others = (control.value?.rooms ?? []).map((room) => room.label).filter((label) => label !== ownRoom.value);
   return event.assigned.some(isRobot) && senders.some((who) => !others.includes(who));
 }

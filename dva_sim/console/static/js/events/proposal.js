@@ -34,10 +34,18 @@ export const candidateOf = (label) => candidates.value.find((who) => who.label =
 /** Free robot that would arrive first. */
 export const nearestRobot = computed(() => candidates.value.find((who) => who.free && who.robot)?.label ?? '');
 
-/** Name of a candidate and the time until its arrival. @param {string} label */
-export const estimateOf = (label) => {
+/** True once the person has picked somebody: nobody else takes their place in the button. */
+export const isPicked = computed(() => Boolean(wanted.value) && wanted.value === chosen.value);
+
+/**
+ * Name of a candidate, of whom they replace, and the time until their arrival.
+ * @param {string} label
+ * @param {string} [replaced]
+ */
+export const estimateOf = (label, replaced) => {
   const time = candidateOf(label)?.arrival_s ?? null;
-  return time === null ? label : `${label}, ${secondsText(time)}`;
+  const whom = replaced ? `${label} instead of ${replaced}` : label;
+  return time === null ? whom : `${whom}, ${secondsText(time)}`;
 };
 
 /**
@@ -49,11 +57,11 @@ export const estimateOf = (label) => {
 export function waysOf(who) {
   if (!who || (who.robot && known.value?.task === 'contain')) return []; // robots only look
   const robot = who.robot && robots.value.find((one) => one.label === who.label);
-  const isIdle = robot && modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder;
-  const alone = isIdle && 'mission';
+  const canGo = robot && (who.free || (modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder));
+  const alone = canGo && 'mission';
   const ordered = who.can && 'order';
   const first = who.free ? [ordered, alone] : [alone, ordered]; // no operator may be there to drive it
-  return [...first, robot && (who.can || isIdle) && 'drive'].filter((way) => typeof way === 'string');
+  return [...first, robot && (who.can || canGo) && 'drive'].filter((way) => typeof way === 'string');
 }
 
 /** Choose a candidate by place in the list, from 0. @param {number} place */

@@ -1,6 +1,7 @@
 /** State of the Events page: the list, the event in hand, the person's name, and the reason being typed. */
 import { computed, signal } from '../../vendor/preact.js';
 import { alarmList, control, events, selection, you } from '../store.js';
+import { act, ask } from '../net/actions.js';
 import { eventsInOrder, isOpen } from '../map/shown.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -42,6 +43,23 @@ export const colleagues = computed(() =>
 export const ownerOf = (event) =>
   control.value?.owners?.find((one) => one.event === event.number)?.label ?? event.acknowledged?.label ?? '';
 
+/**
+ * True while nobody has acknowledged an open event, or not since it became more severe.
+ * @param {SiteEvent} event
+ */
+export const isUnseen = (event) => isOpen(event) && (!event.acknowledged || alarmOf(event)?.state === 'unacknowledged');
+
+/** @param {SiteEvent} event */
+const alarmOf = (event) => alarmList.value.alarms.find((alarm) => alarm.event === event.number);
+
+/** Acknowledge an event: at the DVA, or here if it has only become more severe. @param {SiteEvent} event */
+export const acknowledge = (event) => (event.acknowledged
+  ? act('alarm_acknowledge', { alarm: `event ${event.number}` })
+  : act('event_acknowledge', { event: event.number }));
+
+/** Note that the person who has decided on an event has seen it. @param {SiteEvent} event */
+export const seeDecided = (event) => isUnseen(event) && ask('alarm_acknowledge', { alarm: `event ${event.number}` });
+
 /** Shelf of an event's alarm; undefined if it is on none. @param {SiteEvent} event */
 export const shelfOf = (event) => alarmList.value.shelved.find((alarm) => alarm.event === event.number);
 
@@ -77,7 +95,7 @@ export const inHand = computed(() => {
   const found = chosen?.kind === 'event' && events.value.find((event) => event.number === chosen.key);
   if (found) return found;
   const open = eventsInOrder().filter(isOpen);
-  return open.find((event) => !event.acknowledged) ?? open[0] ?? eventsInOrder()[0] ?? null;
+  return open.find(isUnseen) ?? open[0] ?? eventsInOrder()[0] ?? null;
 });
 
 /** @param {number} number of the event to take in hand */

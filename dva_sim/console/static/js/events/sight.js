@@ -26,9 +26,11 @@ function Head({ robot }) {
   void rows.value;
   const row = rowOf(robot.i);
   const holder = row?.holder_label || row?.holder;
-  const task = inHand.value?.assigned.includes(robot.label) ? 'is sent there' : 'could go there';
+  const event = inHand.value;
+  const goes = event?.assigned.includes(robot.label) ? 'is sent there' : 'could go there';
+  const about = [event && !event.over && goes, holder && `held by ${holder}`].filter(Boolean).join(', ');
   return html`<p class="robot-head reported"><${ModeMark} mode=${modeOf(robot.i)} /><b>${robot.label}</b>
-    <span class="soft">${task}${holder ? `, held by ${holder}` : ''}</span></p>`;
+    <span class="soft">${about}</span></p>`;
 }
 
 /** Robot whose picture is shown: the assigned one, else the chosen one, else the nearest one. */

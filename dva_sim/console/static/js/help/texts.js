@@ -45,7 +45,7 @@ export const TEXTS = [
   {
     title: 'Events',
     lines: [
-      'Left: what is open, the worst first; a red edge means that nobody has acknowledged it. Middle: its place, and the picture of the robot that is sent or could go. Right: what you can do.',
+      'Left: what is open, the worst first; a red edge means that nobody has acknowledged it, or not since it became graver. Severity is the worst that has been known; it never falls. Middle: its place, and the picture of the robot that is sent or could go. Right: what you can do.',
       'The blue button sends whom it names: by an order of the DVA, on a mission without a driver, or driven by you.',
       'A robot that you send by itself is yours: say what is there with “Confirm” or “Refute”. “Shift” shows who is there and what happened, and hands over to a colleague.',
       'Alarms sound once you click the loudspeaker in the bar. The title of the page counts what nobody has acknowledged.',
@@ -75,6 +75,7 @@ export const KEYS = [
   ['← → or A D', 'turn, while held'],
   ['Shift', 'slowly, while held'],
   ['Arrows, + −', 'pan and zoom the map, when it has focus'],
+  ['E', 'open the worst alarm that nobody has acknowledged'],
   ['J K', 'next and previous event of the list, on the page Events'],
   ['1 … 9', 'choose whom to send'],
   ['A', 'acknowledge the event in hand'],

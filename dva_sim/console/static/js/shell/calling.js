@@ -62,16 +62,19 @@ export function SoundButton() {
       <path d=${on ? 'M17 9a4 4 0 0 1 0 6' : 'M17 9l5 6M22 9l-5 6'} /></svg></button>`;
 }
 
+/** Open the worst alarm that nobody has acknowledged, on the page Events. */
+export function openWorst() {
+  const [worst] = unseen.peek();
+  if (worst && worst.event !== null) select(worst.event);
+  if (worst) location.hash = '#/events';
+}
+
 /** Worst alarm that nobody has acknowledged, with one button to it; the page Events lists it itself. */
 export function Strip() {
   const [worst] = unseen.value;
   if (!worst || page.value === 'events') return null;
   const more = unseen.value.length - 1;
-  const open = () => {
-    if (worst.event !== null) select(worst.event);
-    location.hash = '#/events';
-  };
   return html`<section class="strip reported" aria-label="Worst alarm"><${SeverityMark} severity=${worst.priority} />
     <b>${worst.text}</b><span class="soft">${worst.priority}, not acknowledged for ${ageText(ageOf(worst.since_ms))}${more ? `; ${more} more` : ''}</span>
-    <button type="button" onClick=${open}>Open</button></section>`;
+    <button type="button" onClick=${openWorst}>Open</button></section>`;
 }

@@ -2,6 +2,7 @@
 import { emergencyStop } from '../net/emergency.js';
 import { isPast } from '../store.js';
 import { openHelp } from '../help/help.js';
+import { openWorst } from './calling.js';
 
 const WRITING = 'input:not([type=range]), textarea, select';
 
@@ -12,7 +13,9 @@ export function listenForKeys() {
       event.preventDefault();
       if (!event.repeat && !isPast.value) emergencyStop();
     }
-    if (event.key === '?' && !isWriting(event.target)) openHelp();
+    if (isWriting(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === '?') openHelp();
+    if (event.key === 'e') openWorst();
   });
 }
 
