@@ -130,7 +130,7 @@ def test_a_phone_says_that_the_dvas_server_is_stopped(console, visits):
     page.goto(at.phone)
     visit.context.request.get(at.drive)
     for action, arguments, count in (("server_stop", {}, 1), ("server_start", {"port": 5555}, 0)):
-        body = {"id": f"phone {action}", "action": action, "arguments": arguments}
+        body = {"id": f"phone-{action}", "action": action, "arguments": arguments}
         assert visit.context.request.post(f"{at.base}api/actions", data=body).ok
         warning = page.locator(".alerts").get_by_text("The DVA's server is stopped")
         expect(warning).to_have_count(count)
