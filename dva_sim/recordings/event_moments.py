@@ -46,7 +46,7 @@ def _event_at(event: Event, now: float) -> Event | None:
     else:
         state = [state for step, state in _STEPS if step in times][-1]
     sent = state is not State.PENDING
-    return replace(
+    then = replace(
         event,
         state=state,
         needs_containment="contained" in event.times or "act_assigned" in event.times,
@@ -55,6 +55,9 @@ def _event_at(event: Event, now: float) -> Event | None:
         actor=event.actor if "act_assigned" in times else None,
         times=times,
     )
+    if not then.open:  # live runs do not keep when
+        times.setdefault("closed", max(times.values()))
+    return then
 
 
 def _handling(facts: Sequence[Fact], number: int, now: float) -> Handling:

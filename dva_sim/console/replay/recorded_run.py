@@ -42,6 +42,7 @@ from dva_sim.kernel.recorder import DriveLog, Sent
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.facts import Fact
 from dva_sim.recordings.event_moments import ROUNDED, statuses_at
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.full.stage import DVA
@@ -159,6 +160,7 @@ class RecordedRun:
         self._drives: dict[str, list[DriveLog]] = {}
         for drive in playback.recorder.drives:
             self._drives.setdefault(drive.robot, []).append(drive)
+        self._facts = playback.facts or _facts_heard(playback.recorder.traffic or ())
         self._windows: dict[str, RobotLines] = {}
         self._devices: RecordedDevices | None = None
         self._hazards = HazardFeed(
@@ -354,7 +356,7 @@ class RecordedRun:
         site = playback.site
         lines = [
             event_row(status, received_at=now, labels=playback.labels, site=site, frame=site.frame)
-            for status in statuses_at(playback.events, playback.facts, now)
+            for status in statuses_at(playback.events, self._facts, now)
         ]
         return {"k": "events", "t": _ms(now), "events": lines}
 
@@ -362,7 +364,7 @@ class RecordedRun:
         """Return the histories of events, as a control room would have heard them by then."""
         found: dict[int, EventHistory] = {}
         for event in self.playback.events:
-            facts = [fact for fact in self.playback.facts if fact.event == event.number]
+            facts = [fact for fact in self._facts if fact.event == event.number]
             moments = {*event.times.values(), *(fact.time for fact in facts)}
             for moment in sorted(time for time in moments if time <= now + ROUNDED):
                 history = found.setdefault(event.number, EventHistory())
@@ -417,6 +419,22 @@ class RecordedRun:
             "pose": [round(own.x, 3), round(own.y, 3), round(own.heading, 4)],
             "figures": figures,
         }
+
+
+def _facts_heard(traffic: Iterable[Sent]) -> list[Fact]:
+    """Return the decisions that the DVA told the first control room that heard of any."""
+    records = [
+        (sent, body)
+        for sent in traffic
+        if isinstance(sent.payload, bytes)
+        and b"<AuditRecord>" in sent.payload
+        and isinstance(body := decode(sent.payload).body, m.AuditRecord)
+    ]
+    room = records[0][0].destination if records else ""
+    heard = (
+        Fact.of_record(body, sent.time, None) for sent, body in records if sent.destination == room
+    )
+    return [*dict.fromkeys(heard)]  # one that it subscribed to twice came twice
 
 
 def _ms(time: float) -> int:

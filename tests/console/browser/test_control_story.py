@@ -100,6 +100,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     opened = read_recording(record)
     (history,) = RecordedRun(opened, record.name).histories(opened.lasted).values()
     in_order(STEPS, [step.what for step in history.steps])
+    assert len({*history.steps}) == len(history.steps)
     sent = list(opened.playback.recorder.traffic or ())
     reports = [one.payload for one in sent if isinstance(one.payload, bytes)]
     in_order(MESSAGES, reports)
