@@ -185,7 +185,7 @@ def test_only_the_dva_runs_without_its_page(programs):
 
 
 def test_the_page_is_no_company_for_a_dva_that_nobody_joins(programs):
-    words = ("--dva", f"127.0.0.1:{free_port()}", "--for", "8", "--page", "0")
+    words = ("--dva", f"127.0.0.1:{free_port()}", "--for", "15", "--page", "0")
     program = programs.start("live", "hands-on", "--only", "dva", *words)
     assert program.ends() == 3
     assert "Console:" in program.output
