@@ -64,9 +64,6 @@ class GuardPhone(Phone):
         done, text = self._page.do("guard_report", kind="fire", x_m=x, y_m=y, severity="high")
         assert done, text
 
-    def stops(self):
-        assert self._page.do("guard_leave")[0]
-
 
 class RosClient:
     """A client of ROS that drives a robot of the run."""
@@ -88,9 +85,6 @@ class RosClient:
         self._page.until(lambda: answers)
         assert answers[0][0], answers
         self._driver.drive(self._robot(), 0.3, 0.0)
-
-    def stops(self):
-        self._driver.release(self._robot(), lambda *_: None)
 
     def leaves(self):
         self._gateway.retire(self._driver)
@@ -115,10 +109,15 @@ class ForeignRobot(RosClient):
 
 
 @pytest.mark.parametrize(
-    ("moment", "rest"),
-    [("before", SHORT), ("while", SHORT), ("after", SHORT), ("while", LONG)],
+    ("kind", "moment", "rest"),
+    [
+        (Phone, "before", SHORT),
+        (Phone, "while", SHORT),
+        (Phone, "after", SHORT),
+        (RosClient, "while", SHORT),
+        *((kind, "while", LONG) for kind in (Phone, Seat, GuardPhone, ForeignRobot, RosClient)),
+    ],
 )
-@pytest.mark.parametrize("kind", [Phone, Seat, GuardPhone, ForeignRobot, RosClient])
 def test_all_tables_are_written(monkeypatch, tmp_path, kind, moment, rest):
     changes = ["guard.kind=person"]
     results = KeptResults(tmp_path / "out", "hands-on", changes, 1, False)
