@@ -148,11 +148,10 @@ def lies_where_claimed(tested):
     }[tested.hypothesis.direction]
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("family", [1, 5])
-def test_a_verdict_and_its_interval_have_one_level(seed, family):
+def test_a_verdict_and_its_interval_have_one_level(family):
     """Studies of known truth: the mean difference is 2 s; claims stand around it."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     times = 50 + rng.gamma(2.0, 1.0, 12)
     rows = [
         {"part": "drive", "cell": cell, "person": person, "trial": 0, "seed": person}
