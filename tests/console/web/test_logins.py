@@ -50,6 +50,13 @@ def logins(users, watch):
     return Logins(users.path, watch)
 
 
+@pytest.fixture
+def unhashed(monkeypatch):
+    """Passwords that are compared as they are, at once: a hash takes its time on purpose."""
+    compare = "dva_sim.console.web.logins.is_password_of"
+    monkeypatch.setattr(compare, lambda _, password: password == PASSWORD)
+
+
 def log_in(logins, name, password=PASSWORD, address="10.0.0.1"):
     return asyncio.run(logins.log_in(name, password, address))
 
@@ -80,7 +87,9 @@ def test_whose_name_and_password_do_not_fit_is_not_let_in(logins, name, password
     assert log_in(logins, name, password) is None
 
 
-def test_a_login_ends_by_itself_by_its_user_and_when_the_user_is_locked(users, logins, watch):
+def test_a_login_ends_by_itself_by_its_user_and_when_the_user_is_locked(
+    unhashed, users, logins, watch
+):
     tokens = [log_in(logins, name) for name in ("look-er", "drive-er", "dispatch-er")]
     assert len(set(tokens)) == 3
     logins.log_out(tokens[0])
@@ -94,7 +103,7 @@ def test_a_login_ends_by_itself_by_its_user_and_when_the_user_is_locked(users, l
     assert logins.user_of(tokens[2]) is None
 
 
-def test_a_new_role_counts_at_once(users, logins, watch):
+def test_a_new_role_counts_at_once(unhashed, users, logins, watch):
     token = log_in(logins, "look-er")
     users.change("look-er", role="drive")
     watch.now += 2.0
@@ -102,7 +111,7 @@ def test_a_new_role_counts_at_once(users, logins, watch):
     users.change("look-er", role="look")
 
 
-def test_attempts_that_fail_are_slowed_by_name_and_by_address(logins, watch):
+def test_attempts_that_fail_are_slowed_by_name_and_by_address(unhashed, logins, watch):
     for _ in range(FREE_TRIES + 1):
         assert log_in(logins, "drive-er", "wrong password") is None
     for name, address in (("drive-er", "10.0.0.2"), ("look-er", "10.0.0.1")):
@@ -113,7 +122,7 @@ def test_attempts_that_fail_are_slowed_by_name_and_by_address(logins, watch):
     assert log_in(logins, "drive-er")
 
 
-def test_a_wait_grows_and_has_an_end(logins, watch):
+def test_a_wait_grows_and_has_an_end(unhashed, logins, watch):
     waits = []
     for _ in range(FREE_TRIES + 8):
         try:
