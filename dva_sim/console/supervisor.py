@@ -100,14 +100,14 @@ class ConsoleSupervisor:
                 if results is not None:
                     self._write(results)
             finally:
-                found = verdicts(world.recorder)
-                for verdict in found:
+                judged = verdicts(world.recorder)
+                for verdict in judged:
                     self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
         if options.record is not None:
             self._say(f"{options.record} written")
-        refuse_unheld(found)
+        refuse_unheld(judged)
 
     def _write(self, results: KeptResults) -> None:
         """Write the results even after an earlier error, and report both errors."""
@@ -136,9 +136,9 @@ class ConsoleSupervisor:
             inlets = Inlets(also=also)
         if inlets is not None:
             outlet = PipeEnd(inlets.inlet())
-            world.recorder.kept = kept = LiveRecorder(world.clock, outlet)
-            kept.is_own = world.is_ours
-            keep_run(world.run, kept)
+            world.recorder.kept = recorder = LiveRecorder(world.clock, outlet)
+            recorder.is_own = world.is_ours
+            keep_run(world.run, recorder)
         try:
             with auditing(options.audit, world.clock, self._about(world), self._say) as audit:
                 world.keep_audit(audit)

@@ -11,9 +11,11 @@ from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.seats import REFUSAL, Answered, DoneLine
 from dva_sim.kernel.errors import DvaSimError
 
-SAME: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
+SAME_STOP_S: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
 
-BYE: Final = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
+FAREWELL_PREFIX: Final = (
+    "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
+)
 
 
 class Answers:
@@ -47,11 +49,11 @@ class Answers:
                 though its id was used before.
         """
         if number in self.given:
-            known = self.given[number]
-            if known is None:
+            entry = self.given[number]
+            if entry is None:
                 return
-            if not repeats or time.monotonic() - self._at[number] < SAME:
-                tell(known)
+            if not repeats or time.monotonic() - self._at[number] < SAME_STOP_S:
+                tell(entry)
                 return
         self.given[number] = None
         if len(self.given) > self.MOST:

@@ -45,12 +45,12 @@ def does(*names: str) -> Callable[[_Marked], _Marked]:
 
 def doers_of(holders: Iterable[object]) -> dict[str, Callable[..., object]]:
     """Collect the marked methods of some objects by the names of their actions."""
-    found: dict[str, Callable[..., object]] = {}
+    doers: dict[str, Callable[..., object]] = {}
     for holder in holders:
         for attribute in dir(type(holder)):
             for name in getattr(getattr(type(holder), attribute), "does", ()):
-                found[name] = getattr(holder, attribute)
-    return found
+                doers[name] = getattr(holder, attribute)
+    return doers
 
 
 class ActionDispatcher:
@@ -87,11 +87,11 @@ class ActionDispatcher:
         what = str(line.get("do", ""))
         client = str(line.get("client", ""))
         number = line.get("id")
-        known = _KNOWN.get(what)
-        if known is not None and not known.has_answer:
+        action = _KNOWN.get(what)
+        if action is not None and not action.has_answer:
             self._hear(what, client, line)
         elif isinstance(number, str):
-            repeats = known is not None and known.waits is Queueing.FIRST
+            repeats = action is not None and action.waits is Queueing.FIRST
             do = partial(self.do, client, line | {"do": what})
             self._answers.once(number, do, self._tell, repeats=repeats)
 
@@ -100,10 +100,10 @@ class ActionDispatcher:
         take = self._doers.get(what)
         if take is not None:
             try:
-                asked = _checked(line)
+                request = _checked(line)
             except BadMessage:
                 return
-            take(client, asked)
+            take(client, request)
 
     def do(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Do an action, and note it in the audit log.
@@ -116,11 +116,11 @@ class ActionDispatcher:
         do = self._doers.get(what)
         if do is None:
             raise Refused(self._elsewhere.format(what=what))
-        asked = _checked(line)
+        request = _checked(line)
         audited = self._audited()
         if audited is not None:
-            on_result = audited.answered(what, client, asked, on_result)
-        answering(partial(do, client, asked), on_result)
+            on_result = audited.answered(what, client, request, on_result)
+        answering(partial(do, client, request), on_result)
 
 
 _KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}
@@ -129,6 +129,6 @@ _KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}
 def _checked(line: Asked) -> Asked:
     """Check the arguments of a line against their declaration."""
     head = {key: value for key, value in line.items() if key in _HEAD}
-    given = {key: value for key, value in line.items() if key not in _HEAD}
-    asked: Asked = _KNOWN[line["do"]].read(given) | head
-    return asked
+    arguments = {key: value for key, value in line.items() if key not in _HEAD}
+    request: Asked = _KNOWN[line["do"]].read(arguments) | head
+    return request

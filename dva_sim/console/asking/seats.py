@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from dva_sim.console.wire.limits import SILENT_AFTER
 
-MOST_SEATS = 16
+MAX_SEATS = 16
 FIRST_OF_PHONES = 1000  # number of the seat of the first phone; the console's own are below
 RELOADED = 3.0  # design: a page that is loaded again is open again by then, real time [s]
 
@@ -71,7 +71,7 @@ class Seats:
             return self.taken[client].number
         used = {seat.number for seat in self.taken.values()}
         free = next(
-            (n for n in (rather, *range(MOST_SEATS)) if n is not None and n not in used), None
+            (n for n in (rather, *range(MAX_SEATS)) if n is not None and n not in used), None
         )
         if free is not None:
             self.sit_at(client, free)

@@ -30,9 +30,9 @@ from dva_sim.recordings.audit_log import (
     AuditWriteError,
 )
 
-AGAIN: Final = 1.0  # after so long a full disk is tried again [s]
-MOST_AT_ONCE: Final = 500  # rows of a transaction
-MOST_WAITING: Final = 10_000  # rows that wait for a disk; more are counted, and told of in a row
+RETRY_DELAY_S: Final = 1.0  # after so long a full disk is tried again [s]
+MAX_AT_ONCE: Final = 500  # rows of a transaction
+MAX_WAITING: Final = 10_000  # rows that wait for a disk; more are counted, and told of in a row
 SYSTEM: Final = "console"  # author of the rows that no person is behind
 
 Then = Callable[[str], object]
@@ -109,7 +109,7 @@ class AuditKeeper:
 
     def put(self, entry: AuditEntry, then: Then = lambda _: None) -> None:
         """Queue a row; `then` is called once it is on disk, or with the reason why not."""
-        if self._asked.qsize() >= MOST_WAITING:
+        if self._asked.qsize() >= MAX_WAITING:
             self._lost += 1
             then("the audit log cannot be written, and too much waits for it already")
             return
@@ -186,16 +186,16 @@ class AuditKeeper:
 
     def _next(self, is_behind: bool) -> tuple[list[_Asked], bool]:
         """Return what was asked for meanwhile, and whether that was all; wait a while for more."""
-        found = list[_Asked]()
+        entries = list[_Asked]()
         with suppress(queue.Empty):
-            asked = self._asked.get(timeout=AGAIN if is_behind else None)
-            while asked is not None:
-                found.append(asked)
-                if len(found) >= MOST_AT_ONCE:
-                    return found, False
-                asked = self._asked.get_nowait()
-            return found, True
-        return found, False
+            entry = self._asked.get(timeout=RETRY_DELAY_S if is_behind else None)
+            while entry is not None:
+                entries.append(entry)
+                if len(entries) >= MAX_AT_ONCE:
+                    return entries, False
+                entry = self._asked.get_nowait()
+            return entries, True
+        return entries, False
 
     def _tell(self, rows: Sequence[AuditRow], waiting: Sequence[Then], problem: str) -> None:
         self._done.append((rows, waiting, problem))

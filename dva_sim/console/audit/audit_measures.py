@@ -12,7 +12,7 @@ from typing import Any
 from dva_sim.console.wire.audit_answers import AuditMeasures, Override, TimesTaken
 from dva_sim.recordings.audit_log import AuditRow
 
-MOST_OVERRIDES = 50  # of the last that are told one by one
+MAX_OVERRIDES = 50  # of the last that are told one by one
 
 
 def measured(rows: Iterable[AuditRow]) -> AuditMeasures:
@@ -31,7 +31,7 @@ def measured(rows: Iterable[AuditRow]) -> AuditMeasures:
         "assigned_by_policy": len(assigned) - len(by_people),
         "overrides": len(overrides),
         "lost_s": _lost(overrides),
-        "newest_overrides": [_override(row) for row in overrides[-MOST_OVERRIDES:]],
+        "newest_overrides": [_override(row) for row in overrides[-MAX_OVERRIDES:]],
     }
 
 
@@ -59,13 +59,13 @@ def _times(rows: Iterable[AuditRow]) -> TimesTaken:
 
 def _lost(overrides: Sequence[AuditRow]) -> float | None:
     """Return how much later those sent are expected than the policy's, in the median [s]."""
-    known = [
+    ages = [
         did - advised
         for row in overrides
         if (did := _number(row.details.get("arrival_s"))) is not None
         and (advised := _number(row.details.get("advised_s"))) is not None
     ]
-    return round(median(known), 1) if known else None
+    return round(median(ages), 1) if ages else None
 
 
 def _override(row: AuditRow) -> Override:

@@ -99,28 +99,28 @@ class DecisionAudit(Audited):
         if ACTIONS[what].audit is not Audit.DVA:
             return report
         number = str(line["id"])
-        asked = self._asked[number] = AskedDecision(_action(what), line.get("event"), client)
+        decision = self._asked[number] = AskedDecision(_action(what), line.get("event"), client)
 
         def wait(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             self._rooms.add(self._room(client))
-            asked.finish = partial(report, ok, text, **more)
-            if not ok or asked.record is not None:
-                asked.finish()
+            decision.finish = partial(report, ok, text, **more)
+            if not ok or decision.record is not None:
+                decision.finish()
             else:
                 self._system.clock.call_after(RECORD_WITHIN, self._finish, number)
 
         return wait
 
     def _finish(self, number: str) -> None:
-        asked = self._asked.get(number)
-        if asked is not None and asked.finish is not None:
-            asked.finish()
+        decision = self._asked.get(number)
+        if decision is not None and decision.finish is not None:
+            decision.finish()
 
     def heard(self, record: m.AuditRecord) -> None:
         """Take the DVA's record of a decision."""
-        for number, asked in self._asked.items():
-            if asked.matches(record) and record.author == self._room(asked.client):
-                asked.record = record
+        for number, decision in self._asked.items():
+            if decision.matches(record) and record.author == self._room(decision.client):
+                decision.record = record
                 self._finish(number)
                 return
         if record.code == m.OK or record.author not in self._rooms:  # else its answer has said so
@@ -128,13 +128,13 @@ class DecisionAudit(Audited):
 
     @override
     def _note(self, what: str, client: str, line: Asked, outcome: str, text: str) -> None:
-        asked = self._asked.pop(str(line["id"]), None)
-        if asked is None:
+        decision = self._asked.pop(str(line["id"]), None)
+        if decision is None:
             super()._note(what, client, line, outcome, text)
-        elif asked.record is not None:
-            self._put(asked.record, self._author(client))
+        elif decision.record is not None:
+            self._put(decision.record, self._author(client))
         else:
-            self._note_answer(asked, client, line, outcome, text)
+            self._note_answer(decision, client, line, outcome, text)
 
     def _put(self, record: m.AuditRecord, author: str) -> None:
         arguments: Asked = {
@@ -168,18 +168,18 @@ class DecisionAudit(Audited):
         )
 
     def _note_answer(
-        self, asked: AskedDecision, client: str, line: Asked, outcome: str, text: str
+        self, decision: AskedDecision, client: str, line: Asked, outcome: str, text: str
     ) -> None:
         """Note a decision by request and answer, which are all that is known."""
         values = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}
-        waited = self._system.age_of(asked.event)
+        waited = self._system.age_of(decision.event)
         self.keeper.put(
             self.keeper.entry(
-                asked.action.replace("_", " "),
+                decision.action.replace("_", " "),
                 self._author(client),
                 device=self._room(client) or "",
                 role=self._system.role,
-                event=asked.event,
+                event=decision.event,
                 subject=self._label(str(line.get("device", ""))),
                 cause=str(line.get("reason") or ""),
                 outcome=outcome,

@@ -34,7 +34,9 @@ class ConsoleActions:
     def __init__(self, pages: ConsolePages, place: ActionPlace, elsewhere: str) -> None:
         self._pages = pages
         self._driving = driving = Driving(pages.driven)
-        alarms = AlarmActions(pages.alarms, pages.author, lambda *given: dispatcher.do(*given))
+        alarms = AlarmActions(
+            pages.alarms, pages.author, lambda *arguments: dispatcher.do(*arguments)
+        )
         decisions = DecisionActions(pages.driven, pages.rooms, driving)
         desk = DeskActions(
             pages.driven,

@@ -141,11 +141,11 @@ class DecisionActions:
             raise Refused(f"there is no event {line['event']}")
         robot = self._driving.robot(line["robot"])
         decisions = line.get("decisions")
-        known = status.decisions if decisions is None else decisions
+        seen_decisions = status.decisions if decisions is None else decisions
 
         def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
             mission = self.sent.send(client, agent, robot, status)
-            mission.begin(line.get("reason") or None, known, on_result)
+            mission.begin(line.get("reason") or None, seen_decisions, on_result)
 
         self._rooms.decide(client, _role(line), on_result, send)
 

@@ -120,8 +120,8 @@ class DeskActions:
         sender = self._author(client)
         event = line.get("event")
         numbers = self._answered_for(client, sender) if event is None else [event]
-        known = self._rooms.listener.events
-        if event is not None and (event not in known or known[event].closed_for is not None):
+        events = self._rooms.listener.events
+        if event is not None and (event not in events or events[event].closed_for is not None):
             raise Refused(f"event {event} is not open")
         missions = [
             self._system.label_of(mission.robot)
@@ -147,13 +147,13 @@ class DeskActions:
         """Return the open events that a person answers for, or has sent a robot to."""
         owners = self._rooms.handing_over.owners
         sent = {mission.event for mission in self._decisions.sent.of_client(client)}
-        found = []
+        numbers = []
         for number, status in sorted(self._rooms.listener.events.items()):
             seen = status.acknowledged
             owner = owners.get(number, seen.label if seen else "")
             if status.closed_for is None and (owner == name or number in sent):
-                found.append(number)
-        return found
+                numbers.append(number)
+        return numbers
 
     def _held(self, client: str) -> list[str]:
         """Return the robots in a page's seat, by label."""

@@ -16,7 +16,7 @@ from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.operator.steps import ask_emergency
-from dva_sim.console.asking.answers import BYE
+from dva_sim.console.asking.answers import FAREWELL_PREFIX
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.audit.audited import name_of_page
@@ -209,12 +209,12 @@ class Driving:
         Raises:
             Refused: it names none, or one that nobody knows.
         """
-        given = line.get("robots", "all")
-        if given == "all":
+        names = line.get("robots", "all")
+        if names == "all":
             return list(self._system.robots())
-        if not given:
+        if not names:
             raise Refused("No robot was named.")
-        return list(dict.fromkeys(self.robot(one) for one in given))
+        return list(dict.fromkeys(self.robot(one) for one in names))
 
     def held(self, client: str, line: OfRobot) -> HeldRobot:
         """Return the robot that a line names, in the hands of a page's person.
@@ -228,16 +228,16 @@ class Driving:
             raise Refused(f"You do not hold {self._system.label_of(robot)}.")
         return held
 
-    def robot(self, given: Any) -> str:
+    def robot(self, name: Any) -> str:
         """Return the id of a robot by its number or label.
 
         Raises:
             Refused: nobody knows it.
         """
         for robot in self._system.robots():
-            if given in self._system.names_of(robot):
+            if name in self._system.names_of(robot):
                 return robot
-        raise Refused(f"there is no robot {given!r}")
+        raise Refused(f"there is no robot {name!r}")
 
     # --- drives ----------------------------------------------------------------------------
 
@@ -289,17 +289,17 @@ class Driving:
         Raises:
             Refused: nobody knows any of them.
         """
-        given = line.get("robots", "all")
+        names = line.get("robots", "all")
         everywhere = [robot for robot in self._system.robots() if self._system.hears(robot)]
-        if given == "all":
+        if names == "all":
             named = everywhere
-        elif not given:
+        elif not names:
             raise Refused("No robot was named.")
         else:
-            named = [r for r in everywhere if self._system.names_of(r) & set(given)]
+            named = [r for r in everywhere if self._system.names_of(r) & set(names)]
         if not named:
             raise Refused(
-                "no robot is listed" if given == "all" else f"there is no robot {given[0]!r}"
+                "no robot is listed" if names == "all" else f"there is no robot {names[0]!r}"
             )
         return named
 
@@ -461,7 +461,7 @@ class Driving:
 
 def is_gone_for_good(line: Asked) -> bool:
     """Return True for a release in the name of a page that will never come back."""
-    return str(line["id"]).startswith(BYE)
+    return str(line["id"]).startswith(FAREWELL_PREFIX)
 
 
 def _nobody(ok: bool, text: str) -> None:

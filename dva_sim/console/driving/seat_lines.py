@@ -60,10 +60,10 @@ class SeatLines:
         command = drive.applied[-1]
         acted = self._acted.setdefault(drive.robot, ActedInput())
         acted.age_ms = round(1000 * (command.time - command.issued), 1)
-        given = held.acted(command.issued, command.sample_age)
-        if given is not None:
-            acted.input = {"n": given.number, "at_ms": round(1000 * time.time(), 1)}
-            acted.loop_ms = round(1000 * (command.time - given.time), 1)
+        given_at = held.acted(command.issued, command.sample_age)
+        if given_at is not None:
+            acted.input = {"n": given_at.number, "at_ms": round(1000 * time.time(), 1)}
+            acted.loop_ms = round(1000 * (command.time - given_at.time), 1)
 
     def _held(self, drive: DriveLog) -> HeldRobot | None:
         for person in self._persons.values():

@@ -66,7 +66,7 @@ class SeatSensors:
         """Return the sensors that a robot offers, with values of those that are read."""
         watch, rate_hz, values = self._watches.get(held, (None, 0.0, {}))
         now = held.device.clock.now
-        shown: list[SensedShown] = []
+        lines: list[SensedShown] = []
         for sensor in held.offered:
             value, at = values.get(sensor.name, (None, now))
             line: SensedShown = {
@@ -80,8 +80,8 @@ class SeatSensors:
                 line["least"] = min(value.values)
             elif value is not None:
                 line["values"] = list(value.values)
-            shown.append(line)
-        return shown
+            lines.append(line)
+        return lines
 
 
 class SensorActions:

@@ -46,7 +46,7 @@ class Seating:
     def person(self, number: int) -> PersonAgent:
         """Return the person of a seat; seats of the console are made from 0 on, unmanned."""
         while number < FIRST_OF_PHONES and number not in self.persons:
-            place = sum(1 for known in self.persons if known < FIRST_OF_PHONES)
+            place = sum(1 for place_taken in self.persons if place_taken < FIRST_OF_PHONES)
             device = self._make(place + 1)
             device.withdrawn = True
             self.let_in(place, PersonAgent(device, self.console))

@@ -20,8 +20,8 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import pattern
 
 RENEW: Final = 3.0  # from one registration to the next: a third of what the DVA bears [s]
-MOST: Final = 64
-NOWHERE: Final = "192.0.2.{}"  # addresses that belong to nobody (RFC 5737)
+MAX_FAKES: Final = 64
+DOCUMENTATION_ADDRESS: Final = "192.0.2.{}"  # addresses that belong to nobody (RFC 5737)
 
 MakeDevice = Callable[[str, str, str, str], AgentDevice]
 
@@ -63,8 +63,8 @@ class FakeDevices:
         Raises:
             Refused: it cannot be.
         """
-        if len(self.devices) >= MOST:
-            raise Refused(f"There are already {MOST} fake devices. Remove one first.")
+        if len(self.devices) >= MAX_FAKES:
+            raise Refused(f"There are already {MAX_FAKES} fake devices. Remove one first.")
         id_tag, address = self._identity(line)
         device = self._make(id_tag, line["label"], line["type"], address)
         self.devices[id_tag] = device
@@ -122,16 +122,16 @@ class FakeDevices:
         Raises:
             Refused: the id is taken, or is none.
         """
-        wanted = line.get("id_tag", "").strip().upper()
+        id_tag = line.get("id_tag", "").strip().upper()
         number = next(n for n in range(1, 1 << 16) if not self._is_taken(self._id_of(n)[0]))
         own, address = self._id_of(number)
-        if wanted and not re.fullmatch(pattern("DeviceID"), wanted):
+        if id_tag and not re.fullmatch(pattern("DeviceID"), id_tag):
             raise Refused(
                 "id should be six pairs of digits 0 to 9 and letters A to F, as in " + own
             )
-        if wanted and self._is_taken(wanted):
-            raise Refused(f"id {wanted} is taken")
-        return wanted or own, line.get("address", "").strip() or address
+        if id_tag and self._is_taken(id_tag):
+            raise Refused(f"id {id_tag} is taken")
+        return id_tag or own, line.get("address", "").strip() or address
 
     def _is_taken(self, id_tag: str) -> bool:
         return id_tag in self.devices or self._is_known(id_tag)

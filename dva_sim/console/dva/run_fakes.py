@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.dva.fake_devices import DOCUMENTATION_ADDRESS, FakeDevices
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import address_of, id_of
@@ -26,7 +26,11 @@ def fakes_of(run: Run, bench: RunBench, dismissed: Callable[[str], object]) -> F
 
     def identity(number: int) -> tuple[str, str]:
         is_modelled = bench.is_modelled
-        address = address_of("fake", number) if is_modelled else NOWHERE.format(number % 250 + 1)
+        address = (
+            address_of("fake", number)
+            if is_modelled
+            else DOCUMENTATION_ADDRESS.format(number % 250 + 1)
+        )
         return id_of("fake", number), address
 
     def dismiss(id_tag: str) -> None:

@@ -29,8 +29,8 @@ PRIORITIES: Final = ("critical", "high", "medium", "low")
 NEW_FOR: Final = 5.0  # so long an alarm stands out as new [s]
 FLOOD_WINDOW: Final = 600.0  # [s]
 FLOOD_BEGINS, FLOOD_ENDS = 10, 5  # alarms within that window
-LONGEST_SHELF: Final = 8 * 3600.0  # a shift [s]
-MOST_ALARMS: Final = 500  # that are known at once; of more the gravest
+MAX_SHELF: Final = 8 * 3600.0  # a shift [s]
+MAX_ALARMS: Final = 500  # that are known at once; of more the gravest
 
 
 class AlarmState(StrEnum):
@@ -105,24 +105,24 @@ class Alarms:
         self.known: dict[str, RaisedAlarm] = {}
         self.is_flood = False
         self.left_out = 0
-        self._raised: deque[float] = deque(maxlen=MOST_ALARMS)
+        self._raised: deque[float] = deque(maxlen=MAX_ALARMS)
 
     # --- what happens -----------------------------------------------------------------------
 
     def update(self, conditions: Iterable[AlarmCondition], now: float) -> None:
         """Set the present conditions; those not named are over."""
         on = sorted(conditions, key=lambda c: PRIORITIES.index(c.priority))
-        self.left_out = max(0, len(on) - MOST_ALARMS)
-        present = {condition.key: condition for condition in on[:MOST_ALARMS]}
+        self.left_out = max(0, len(on) - MAX_ALARMS)
+        present = {condition.key: condition for condition in on[:MAX_ALARMS]}
         for key, alarm in list(self.known.items()):
             if alarm.is_on and key not in present:
                 self._is_over(key)
         for key, condition in present.items():
-            known = self.known.get(key)
-            if known is None or not known.is_on:
-                self._raise(condition, now, known)
+            before = self.known.get(key)
+            if before is None or not before.is_on:
+                self._raise(condition, now, before)
             else:
-                self._go_on(known, condition, now)
+                self._go_on(before, condition, now)
         self.go_on(now)
 
     def go_on(self, now: float) -> None:
@@ -130,21 +130,21 @@ class Alarms:
         self._unshelve_the_due(now)
         self._look_for_a_flood(now)
 
-    def _raise(self, condition: AlarmCondition, now: float, known: RaisedAlarm | None) -> None:
+    def _raise(self, condition: AlarmCondition, now: float, before: RaisedAlarm | None) -> None:
         alarm = RaisedAlarm(condition, AlarmState.UNACKNOWLEDGED, now)
-        if known is not None:  # it comes back: a shelf goes on
+        if before is not None:  # it comes back: a shelf goes on
             alarm = replace(
                 alarm,
-                shelved_until=known.shelved_until,
-                shelved_by=known.shelved_by,
-                shelved_why=known.shelved_why,
+                shelved_until=before.shelved_until,
+                shelved_by=before.shelved_by,
+                shelved_why=before.shelved_why,
             )
         self._raised.append(now)
         self._keep(self._seen(alarm, condition.seen_by))
 
-    def _go_on(self, known: RaisedAlarm, condition: AlarmCondition, now: float) -> None:
-        alarm = replace(known, condition=condition)
-        graver = PRIORITIES.index(condition.priority) < PRIORITIES.index(known.condition.priority)
+    def _go_on(self, before: RaisedAlarm, condition: AlarmCondition, now: float) -> None:
+        alarm = replace(before, condition=condition)
+        graver = PRIORITIES.index(condition.priority) < PRIORITIES.index(before.condition.priority)
         if graver:
             alarm = replace(alarm, shelved_until=None, shelved_by="", shelved_why="")
             alarm = replace(alarm, state=AlarmState.UNACKNOWLEDGED, raised=now, seen_by="")
@@ -167,7 +167,7 @@ class Alarms:
 
     def _keep(self, alarm: RaisedAlarm) -> None:
         self.known[alarm.condition.key] = alarm
-        while len(self.known) > 2 * MOST_ALARMS:  # of those that are over, the oldest goes
+        while len(self.known) > 2 * MAX_ALARMS:  # of those that are over, the oldest goes
             gone = (key for key, alarm in self.known.items() if not alarm.is_on)
             del self.known[next(gone)]
 
@@ -213,7 +213,7 @@ class Alarms:
 
     def shelve(self, key: str, seconds: float, by: str, now: float, why: str = "") -> None:
         """Take an alarm out of the list for so long [s], as nobody can act on it now."""
-        until = now + min(seconds, LONGEST_SHELF)
+        until = now + min(seconds, MAX_SHELF)
         alarm = replace(self.known[key], shelved_until=until, shelved_by=by, shelved_why=why)
         self.known[key] = alarm
 
@@ -234,9 +234,9 @@ class Alarms:
 
     def shelved(self, now: float) -> list[AlarmRow]:
         """Return the shelved alarms with their remaining time; the first to return first."""
-        found = [alarm for alarm in self.known.values() if alarm.shelved_until is not None]
-        found.sort(key=lambda alarm: alarm.shelved_until or 0.0)
-        return [_row([alarm], now) for alarm in found]
+        alarms = [alarm for alarm in self.known.values() if alarm.shelved_until is not None]
+        alarms.sort(key=lambda alarm: alarm.shelved_until or 0.0)
+        return [_row([alarm], now) for alarm in alarms]
 
     def _folded(self, listed: Sequence[RaisedAlarm]) -> Iterator[list[RaisedAlarm]]:
         """Return each for itself, or in a flood those of a kind and place together."""

@@ -123,17 +123,17 @@ class ConsoleAlarms:
         Raises:
             Refused: there is no such row any more.
         """
-        found = self.alarms.members(str(key))
-        if not found:
+        members = self.alarms.members(str(key))
+        if not members:
             raise Refused("That alarm is over.")
-        return found
+        return members
 
     def by_event(self, keys: Iterable[str]) -> Mapping[str, int]:
         """Return the alarms of open events whose acknowledgement is news to the DVA."""
-        known = ((key, self.alarms.known[key]) for key in keys)
+        alarms = ((key, self.alarms.known[key]) for key in keys)
         return {
             key: alarm.condition.event
-            for key, alarm in known
+            for key, alarm in alarms
             if alarm.is_on
             and alarm.condition.event is not None
             and alarm.condition.seen_by is None

@@ -40,8 +40,8 @@ def decision_of(
     label = str(line.get("device", ""))
 
     def known() -> int | None:
-        given: int | None = line.get("decisions")
-        return seen(number) if given is None else given
+        decisions: int | None = line.get("decisions")
+        return seen(number) if decisions is None else decisions
 
     match line["do"]:
         case "event_acknowledge":

@@ -10,8 +10,8 @@ from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.decisions import moment_ms
 from dva_sim.console.wire.events import OfferShown, OwnerShown
 
-MOST_OFFERS: Final = 50  # at once; of more the oldest are withdrawn
-MOST_OWNERS: Final = 1000  # events that were handed over; of more the oldest are forgotten
+MAX_OFFERS: Final = 50  # at once; of more the oldest are withdrawn
+MAX_OWNERS: Final = 1000  # events that were handed over; of more the oldest are forgotten
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class HandingOver:
                 del self._offers[number]
         self._count += 1
         self._offers[self._count] = offer
-        if len(self._offers) > MOST_OFFERS:
+        if len(self._offers) > MAX_OFFERS:
             del self._offers[next(iter(self._offers))]
 
     def answer(self, number: int, client: str, accepted: bool) -> Offer:
@@ -92,7 +92,7 @@ class HandingOver:
     def give(self, event: int, to: str) -> None:
         """Let somebody answer for an event from now on."""
         self.owners[event] = to
-        if len(self.owners) > MOST_OWNERS:
+        if len(self.owners) > MAX_OWNERS:
             del self.owners[next(iter(self.owners))]
 
     def shown(self, present: Collection[str]) -> list[OfferShown]:
@@ -129,5 +129,5 @@ def client_named(name: str, people: Mapping[str, str]) -> str:
     for client, label in people.items():
         if label == name:
             return client
-    known = ", ".join(sorted(set(people.values()))) or "nobody"
-    raise Refused(f"{name!r} is not there; there: {known}")
+    names = ", ".join(sorted(set(people.values()))) or "nobody"
+    raise Refused(f"{name!r} is not there; there: {names}")

@@ -20,7 +20,7 @@ from dva_sim.console.events.decisions import why
 from dva_sim.protocol import messages as m
 
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
-MOST_UNANSWERED: Final = 10  # of such questions in a row; then it is given back
+MAX_UNANSWERED: Final = 10  # of such questions in a row; then it is given back
 UNDER_WAY: Final = ("under_way", "waiting", "replanning")
 BY_A_PERSON: Final = 0.95  # confidence in a finding; of operators, too
 BY_ITS_CAMERA: Final = 0.6  # in what a robot's sensor alone reports; assumed
@@ -142,7 +142,7 @@ class RobotMission:
         def lost() -> None:
             if self._is_over:
                 return
-            if silences < MOST_UNANSWERED:
+            if silences < MAX_UNANSWERED:
                 self._device.clock.call_after(ASK_PERIOD, self._ask, silences + 1)
                 return
             text = f"{self._label} does not answer: how its mission stands is unknown"
@@ -252,7 +252,7 @@ class SentRobots:
         """
 
         def forget() -> None:
-            for key in [key for key, known in self._missions.items() if known is mission]:
+            for key in [key for key, sent in self._missions.items() if sent is mission]:
                 del self._missions[key]
 
         mission = RobotMission(agent, robot, status, forget)
@@ -292,6 +292,6 @@ class SentRobots:
             self._missions[client, mission.event] = mission
             on_result(True, f"event {mission.event} is yours")
             return
-        known = agent.events.get(mission.event, mission.status)
-        handed = self.send(client, agent, mission.robot, known)
-        handed.begin("handed over", known.decisions, on_result)
+        status = agent.events.get(mission.event, mission.status)
+        handed = self.send(client, agent, mission.robot, status)
+        handed.begin("handed over", status.decisions, on_result)

@@ -22,7 +22,7 @@ from dva_sim.protocol.devices import FORGET_AFTER, ControlRoomRole
 from dva_sim.simulation.full.run import Run
 
 LISTENER: Final = 1000  # number of the device that listens for the pages; a scenario's are below
-MOST_ROOMS: Final = 250
+MAX_ROOMS: Final = 250
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of one until its id is given out again [s]
 JOINED_WITHIN: Final = 30.0  # a person is told by then whether the DVA knows the device [s]
 LOOK: Final = 0.05  # from one look whether it does to the next [s]
@@ -147,7 +147,7 @@ class ConsoleRooms:
         clock.every(LOOK, looks_again)
 
     def _new(self, role: str, name: str) -> ConsoleRoom | None:
-        number = next((n for n in range(1, MOST_ROOMS + 1) if n not in self._used), None)
+        number = next((n for n in range(1, MAX_ROOMS + 1) if n not in self._used), None)
         if number is None:
             return None
         self._used.add(number)

@@ -17,8 +17,10 @@ from dva_sim.console.events.decisions import why
 from dva_sim.console.wire.seats import Answered
 from dva_sim.protocol import messages as m
 
-AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
-MOST_TRIES: Final = 40
+RETRY_DELAY_S: Final = (
+    0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
+)
+MAX_TRIES: Final = 40
 
 
 class Takeover:
@@ -94,7 +96,7 @@ class Takeover:
             self._ask_for_it()
         elif isinstance(status, m.EventStatus):
             # The policy was quicker, or the robot is not free yet.
-            self._agent.device.clock.call_after(AGAIN, self._send, status)
+            self._agent.device.clock.call_after(RETRY_DELAY_S, self._send, status)
         else:
             self._ask_for_it()
 
@@ -105,8 +107,8 @@ class Takeover:
         if ok or not self._has_another_try():
             self._on_result(ok, text, **more)
         else:
-            self._agent.device.clock.call_after(AGAIN, self._ask_for_it)
+            self._agent.device.clock.call_after(RETRY_DELAY_S, self._ask_for_it)
 
     def _has_another_try(self) -> bool:
         self._tries += 1
-        return self._tries < MOST_TRIES
+        return self._tries < MAX_TRIES

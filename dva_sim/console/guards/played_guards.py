@@ -29,8 +29,8 @@ class PlayedGuards:
 
     def named(self, label: str) -> PersonGuard | None:
         """Return the guard of a label, if people may play it."""
-        found = (g for g in self._run.field.guards if g.device.label == label)
-        guard = next(found, None)
+        guards = (g for g in self._run.field.guards if g.device.label == label)
+        guard = next(guards, None)
         return guard if isinstance(guard, PersonGuard) else None
 
     def join(self, client: str, guard: PersonGuard) -> None:

@@ -6,7 +6,7 @@ import contextlib
 import socket
 from collections.abc import Iterable
 
-HERE = ("localhost", "127.0.0.1", "::1")
+LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 
 
 def own_address(host: str) -> str:
@@ -26,14 +26,14 @@ def own_address(host: str) -> str:
     return local
 
 
-def own_hosts(given: Iterable[str]) -> list[str]:
+def own_hosts(more: Iterable[str]) -> list[str]:
     """Names and addresses of this machine, as far as it knows them, and others that are given."""
     name = socket.gethostname()
-    found = [*HERE, name, f"{name.partition('.')[0]}.local", own_address("0.0.0.0"), *given]
-    found.append(own_address("::"))
+    hosts = [*LOCAL_HOSTS, name, f"{name.partition('.')[0]}.local", own_address("0.0.0.0"), *more]
+    hosts.append(own_address("::"))
     with contextlib.suppress(OSError):
-        found += [str(entry[4][0]) for entry in socket.getaddrinfo(name, None)]
-    return list(dict.fromkeys(found))
+        hosts += [str(entry[4][0]) for entry in socket.getaddrinfo(name, None)]
+    return list(dict.fromkeys(hosts))
 
 
 def address_of(host: str, port: int, scheme: str = "http") -> str:

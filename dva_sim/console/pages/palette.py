@@ -138,7 +138,7 @@ def _patterns() -> dict[str, tuple[str, str]]:
 def hazard_marks() -> dict[str, dict[str, str]]:
     """Title and mark of each kind of hazard."""
     kinds = sorted(HAZARDS.items())
-    return {kind: {"mark": known.mark, "colour": known.colour} for kind, known in kinds}
+    return {kind: {"mark": look.mark, "colour": look.colour} for kind, look in kinds}
 
 
 def contrast(one: str, other: str) -> float:

@@ -15,12 +15,12 @@ from dva_sim.cameras.painting import NICENESS, run
 from dva_sim.serving.pipes import PipeEnd
 
 
-def main(given: Sequence[str] | None = None) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Draw until the simulation has ended."""
     parser = argparse.ArgumentParser(prog="dva_sim.console.pages.pictures", description=__doc__)
     parser.add_argument("--fd", type=int, required=True, help="socket to the simulation")
     parser.add_argument("--web-fd", type=int, required=True, help="socket to the web process")
-    options = parser.parse_args(given)
+    options = parser.parse_args(words)
     # Ctrl-C may reach all processes; the simulation says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)

@@ -32,7 +32,7 @@ PICTURES = "dva_sim.console.pages.pictures"
 ROLES = ("Dispatch only", "dispatch"), ("Drive only", "drive"), ("Look only", "look")
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
 FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
-MOST_RESTARTS = 5  # of the process that draws
+MAX_RESTARTS = 5  # of the process that draws
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 Say = Callable[[str], object]
@@ -190,7 +190,7 @@ class ConsoleProcesses:
             subject.note(pictures.why())
             self._children.remove(pictures)
             end_all([pictures], 0.0)
-            if self._restarts < MOST_RESTARTS:
+            if self._restarts < MAX_RESTARTS:
                 self._restarts += 1
                 self._draw(subject, self._start_pictures())
                 subject.show_scene()

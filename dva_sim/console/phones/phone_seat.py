@@ -23,9 +23,9 @@ from dva_sim.recordings.motion import MotionApp, MotionSample, MotionWriter
 
 USUAL_HZ = 60.0  # of a phone's browser, until its own rate is known
 RATED_BY = 64  # samples, by which the rate is told
-LEAST_RATED = 8
-FRESH = 1.0  # a rate is told for so long after the newest sample [s]
-MOST_GAP = 10**6  # of what is counted as lost at once
+MIN_RATED = 8
+FRESH_FOR_S = 1.0  # a rate is told for so long after the newest sample [s]
+MAX_GAP = 10**6  # of what is counted as lost at once
 
 
 class PhoneSeat:
@@ -189,7 +189,7 @@ class PhoneSeat:
     def _count(self, samples: Samples, fresh: int) -> None:
         gap = samples.first - self._next
         if self.samples and gap > 0:
-            self.lost += min(gap, MOST_GAP)
+            self.lost += min(gap, MAX_GAP)
         self.samples += fresh
         self._next = samples.first + len(samples.at)
         if self._stamps and samples.at[-1] < self._stamps[-1]:
@@ -200,7 +200,7 @@ class PhoneSeat:
     @property
     def rate_hz(self) -> float | None:
         """Samples per second by the phone's own clock; None: too few are known."""
-        if len(self._stamps) < LEAST_RATED:
+        if len(self._stamps) < MIN_RATED:
             return None
         return (len(self._stamps) - 1) / (self._stamps[-1] - self._stamps[0])
 
@@ -215,7 +215,7 @@ class PhoneSeat:
         held = next(iter(self._held), None)
         profile = self._profile
         rate = self.rate_hz
-        fresh = rate is not None and now - self._came < FRESH
+        fresh = rate is not None and now - self._came < FRESH_FOR_S
         return {
             **self.identity(),
             "registered": self.registered,

@@ -30,8 +30,8 @@ from dva_sim.simulation.scenario import PhoneConfig, phone_profile
 
 DVA_PORT: Final = 5555  # at which the modelled DVA is said to listen
 NOBODY: Final = "02:00:00:00:FF:FF"  # who listens at any other address
-MOST_PHONES: Final = 64
-MOST_IDS: Final = 250
+MAX_PHONES: Final = 64
+MAX_IDS: Final = 250
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of a phone until its id is given out again [s]
 TYPES: Final = {"Robot": ROBOT, "Remote Control": REMOTE, "Teleoperation": OPERATOR}
 """Device types on the wire, by the word on the screen."""
@@ -67,7 +67,7 @@ class Phones:
     def seat(self, client: str) -> PhoneSeat | None:
         """Return the phone of a page, from its first word on; None: there are too many."""
         if client not in self.by_client:
-            if len(self.by_client) >= MOST_PHONES:
+            if len(self.by_client) >= MAX_PHONES:
                 return None
             setup = self._console().setup
             hz = self._console().phone.sample_rate_hz
@@ -138,7 +138,7 @@ class Phones:
 
         None: too many have come and gone lately.
         """
-        number = next((n for n in range(1, MOST_IDS + 1) if n not in self._used), None)
+        number = next((n for n in range(1, MAX_IDS + 1) if n not in self._used), None)
         if number is None:
             return None
         self._used.add(number)

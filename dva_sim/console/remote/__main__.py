@@ -20,15 +20,15 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="dva_sim.console.remote", description=__doc__)
     parser.add_argument("--fd", type=int, required=True, help="socket to the DVA's process")
     parser.add_argument("argument", help="options of the page, as JSON")
-    given = parser.parse_args(words)
-    asked = json.loads(given.argument)
-    files = {name: Path(file) for name, file in asked["files"].items()}
-    options = ConsoleOptions(**asked["options"] | files)
-    pipe = LinePipe(given.fd, PLAIN)
+    parsed = parser.parse_args(words)
+    job = json.loads(parsed.argument)
+    files = {name: Path(file) for name, file in job["files"].items()}
+    options = ConsoleOptions(**job["options"] | files)
+    pipe = LinePipe(parsed.fd, PLAIN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the DVA's process says when it is over
     bench = PipedBench(pipe, str(options.dva))
     try:
-        attach(options, bench.say, bench, asked["own"])
+        attach(options, bench.say, bench, job["own"])
     except DvaSimError as error:
         print(error_line(error), file=sys.stderr)
         return error.exit_code

@@ -95,8 +95,8 @@ class PageBeside:
             "no_token": options.no_token,
         }
         files = {"keys": options.keys, "users": options.users}
-        given = {name: str(file) for name, file in files.items() if file is not None}
-        return json.dumps({"options": page, "files": given, "own": own})
+        paths = {name: str(file) for name, file in files.items() if file is not None}
+        return json.dumps({"options": page, "files": paths, "own": own})
 
     def _hear(self, line: dict[str, Any], port: DvaPort) -> None:
         if line["k"] == "say":

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from dva_sim.console.asking.refusal import Refused
-from dva_sim.console.asking.seats import MOST_SEATS
+from dva_sim.console.asking.seats import MAX_SEATS
 from dva_sim.console.audit.audit_keeper import check_target
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
@@ -88,7 +88,7 @@ def own_id(ring: KeyRing | None) -> str:
 
 def seat_ids(ring: KeyRing | None) -> Callable[[int], str]:
     """Return what gives the n-th seat its id, from 1: that of a key, or one from random on."""
-    first = FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE - MOST_SEATS)
+    first = FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE - MAX_SEATS)
 
     def seat_id(number: int) -> str:
         if ring is None:
@@ -104,10 +104,10 @@ def seat_ids(ring: KeyRing | None) -> Callable[[int], str]:
 
 def _with_secret(ring: KeyRing, kind: str) -> list[str]:
     """Return the devices of a kind whose secret key is here."""
-    found = []
+    devices = []
     for device in ring.devices:
         if kind_of(device)[0] == kind and (ring.folder / "secret").exists():
             with suppress(ConfigError):
                 ring.pair(device)
-                found.append(device)
-    return found
+                devices.append(device)
+    return devices

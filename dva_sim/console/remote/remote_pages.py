@@ -16,7 +16,7 @@ from dva_sim.console.bench import Bench
 from dva_sim.console.desk.console_pages import ConsolePages
 from dva_sim.console.driving.driven_system import REACH, DrivenSystem
 from dva_sim.console.driving.seating import Seating
-from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.dva.fake_devices import DOCUMENTATION_ADDRESS, FakeDevices
 from dva_sim.console.remote.links import RemoteLinks
 from dva_sim.console.remote.named_people import NamedPeople
 from dva_sim.console.remote.options import scenario_shown
@@ -191,7 +191,10 @@ class RemotePages(ConsolePages):
             is_known=lambda device: (
                 device in (DVA, system.device.id_tag) or device in system.state.devices
             ),
-            id_of=lambda number: (id_of("fake", number), NOWHERE.format(number % 250 + 1)),
+            id_of=lambda number: (
+                id_of("fake", number),
+                DOCUMENTATION_ADDRESS.format(number % 250 + 1),
+            ),
             dismiss=self._dismiss,
             removed="is removed" if system.bench is not None else SPEAKS_NO_MORE,
         )

@@ -11,7 +11,7 @@ from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
 LINK: Final[LinkShown] = {"kind": "attached", "processing_s": None}
-AROUND: Final = 40.0  # of the first position, where no site is known [m]
+DEFAULT_REACH_M: Final = 40.0  # of the first position, where no site is known [m]
 
 
 def remote_scene(
@@ -44,7 +44,7 @@ def nowhere(frame: GeoFrame) -> SiteShown:
     """Return a site of which nothing is known but where on earth it lies."""
     return {
         "name": "unknown",
-        "extent_m": [-AROUND, -AROUND, AROUND, AROUND],
+        "extent_m": [-DEFAULT_REACH_M, -DEFAULT_REACH_M, DEFAULT_REACH_M, DEFAULT_REACH_M],
         "origin": {"latitude_deg": frame.latitude, "longitude_deg": frame.longitude},
         "features": {"type": "FeatureCollection", "features": []},
         "rooms": [],

@@ -31,8 +31,8 @@ def player_of(file: Path | None, results: Path | None) -> Player:
     shelf = None if results is None else Shelf(results)
     if file is None:
         return Player(None, shelf)
-    with readable(file) as found:
-        return Player(RecordedRun(read_recording(found), file.name), shelf)
+    with readable(file) as recording:
+        return Player(RecordedRun(read_recording(recording), file.name), shelf)
 
 
 def show_replay(

@@ -65,21 +65,23 @@ class ExchangeLog:
     def __init__(self, traffic: Iterable[Sent], node: str) -> None:
         self._lines: list[list[Any]] = []
         self._times: list[float] = []
-        asked: dict[tuple[str, bytes], list[Any]] = {}
+        line_by_request: dict[tuple[str, bytes], list[Any]] = {}
         for sent in traffic:
             data = sent.payload
             if not isinstance(data, bytes) or node not in (sent.source, sent.destination):
                 continue
             answered = _REPLY.search(data)
             if sent.source == node:
-                line = asked.get((sent.destination, answered[1])) if answered else None
+                line = line_by_request.get((sent.destination, answered[1])) if answered else None
                 if line is not None:
                     line[3] = data.decode("latin-1")
                     line[5] = 0
             elif answered is None:
-                self._add(asked, sent, data)
+                self._add(line_by_request, sent, data)
 
-    def _add(self, asked: dict[tuple[str, bytes], list[Any]], sent: Sent, data: bytes) -> None:
+    def _add(
+        self, line_by_request: dict[tuple[str, bytes], list[Any]], sent: Sent, data: bytes
+    ) -> None:
         """Add a line; a command counts as published until it is found to be answered."""
         is_published = PUBLISHED.search(data) is not None or _COMMAND in data
         when = round(1000 * sent.time)
@@ -87,7 +89,7 @@ class ExchangeLog:
         self._lines.append(line)
         self._times.append(sent.time)
         if number := _NUMBER.search(data):
-            asked[sent.source, number[1]] = line
+            line_by_request[sent.source, number[1]] = line
 
     def until(self, now: float) -> int:
         """Return how many there were up to a moment [s]."""

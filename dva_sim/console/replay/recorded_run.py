@@ -126,7 +126,7 @@ class RecordedDevices:
 
 TURNING = 0.25  # over which a turn rate is measured [s]
 STORY_KEPT = 200  # lines of the story up to a moment
-MOST_MARKS = 400  # moments to jump to
+MAX_MARKS = 400  # moments to jump to
 MARKED = ("event", "drive", "safety", "order")  # kinds of moments that are worth a jump
 
 
@@ -187,8 +187,8 @@ class RecordedRun:
         for label in playback.recorder.tracks:
             if label not in self.numbers:
                 kind = label.rpartition("-")[0]
-                known = kind if kind in ("guard", "bystander") else "guard"
-                self.things.add(ids.get(label, label), label, known, UNKNOWN_PERSON)
+                drawn_as = kind if kind in ("guard", "bystander") else "guard"
+                self.things.add(ids.get(label, label), label, drawn_as, UNKNOWN_PERSON)
         for id_tag, label in playback.labels.items():
             if label not in self.numbers:
                 kind = label.partition("-")[0]
@@ -197,10 +197,10 @@ class RecordedRun:
     def _limits(self) -> list[tuple[float, float]]:
         """Return the robots' limits, if their profiles can still be found; loads no code for it."""
         try:
-            found = robot_profiles(self.playback.scenario)
+            profiles = robot_profiles(self.playback.scenario)
         except DvaSimError:
             return []
-        return [(one.max_speed_mps, one.max_turn_rate_rad_s) for one in found]
+        return [(one.max_speed_mps, one.max_turn_rate_rad_s) for one in profiles]
 
     @property
     def is_drawn(self) -> bool:
@@ -245,7 +245,7 @@ class RecordedRun:
         """Return moments to jump to, in order; of too many, evenly chosen ones."""
         timeline = self.playback.recorder.timeline
         marks = [moment for moment in timeline if moment.kind in MARKED]
-        step = max(1, math.ceil(len(marks) / MOST_MARKS))
+        step = max(1, math.ceil(len(marks) / MAX_MARKS))
         return [moment_shown(moment) for moment in marks[::step]]
 
     # --- a moment --------------------------------------------------------------------------
@@ -362,18 +362,18 @@ class RecordedRun:
 
     def histories(self, now: float) -> dict[int, EventHistory]:
         """Return the histories of events, as a control room would have heard them by then."""
-        found: dict[int, EventHistory] = {}
+        history_by_event: dict[int, EventHistory] = {}
         for event in self.playback.events:
             facts = [fact for fact in self._facts if fact.event == event.number]
             moments = {*event.times.values(), *(fact.time for fact in facts)}
             for moment in sorted(time for time in moments if time <= now + ROUNDED):
-                history = found.setdefault(event.number, EventHistory())
+                history = history_by_event.setdefault(event.number, EventHistory())
                 for status in statuses_at([event], facts, moment):
                     history.hear_status(status, moment)
                 for fact in facts:
                     if fact.time == moment:
                         history.hear_record(fact.record(), moment)
-        return found
+        return history_by_event
 
     def story(self, now: float) -> StorySoFarLine:
         """Return the story up to a moment."""
@@ -431,9 +431,7 @@ def _facts_heard(traffic: Iterable[Sent]) -> list[Fact]:
         and isinstance(body := decode(sent.payload).body, m.AuditRecord)
     ]
     room = records[0][0].destination if records else ""
-    heard = (
-        Fact.of_record(body, sent.time, None) for sent, body in records if sent.destination == room
-    )
+    heard = (Fact.of_record(body, sent.time) for sent, body in records if sent.destination == room)
     return [*dict.fromkeys(heard)]  # one that it subscribed to twice came twice
 
 

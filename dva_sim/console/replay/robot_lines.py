@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable
 
-from dva_sim.console.robots.latencies import KEPT, Latencies
+from dva_sim.console.robots.latencies import KEPT_TIMES, Latencies
 from dva_sim.console.robots.robot_windows import WHEEL
 from dva_sim.console.robots.shown_mode import EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.wire.rows import (
@@ -114,6 +114,6 @@ class RobotLines:
         """Return the one-way delays of the newest commands that had taken effect by then."""
         end = bisect_right(self._applied, now, key=lambda one: one.time)
         figures = Latencies()
-        for one in self._applied[max(0, end - KEPT) : end]:
+        for one in self._applied[max(0, end - KEPT_TIMES) : end]:
             figures.add(one.arrived - one.sent)
         return figures.line()

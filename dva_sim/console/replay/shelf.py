@@ -17,8 +17,8 @@ from dva_sim.recordings.writing import SUFFIX
 from dva_sim.simulation.labels import factor_name, measure_called
 
 Row = Mapping[str, Any]
-MOST = 2000  # recordings in the list
-MOST_MEASURES = 4  # beside the one that answers the study
+MAX_RECORDINGS = 2000  # recordings in the list
+MAX_MEASURES = 4  # beside the one that answers the study
 SHOWN = ("drive_time_s", "confirmation_s", "response_s", "command_age_p95_ms", "collisions")
 
 
@@ -47,21 +47,21 @@ class Shelf:
         self.folder = folder
         results = Results.load(folder) if (folder / MANIFEST).exists() else None
         where = folder / FOLDER if (folder / FOLDER).is_dir() else folder
-        paths = sorted(where.glob(f"*{SUFFIX}"))[:MOST]
+        paths = sorted(where.glob(f"*{SUFFIX}"))[:MAX_RECORDINGS]
         if not paths:
             hint = "; a study keeps some with `record: worst`" if results is not None else ""
             raise ConfigError(f"contains no recordings{hint}", folder)
         page = folder / PAGE
         self.report = page if page.is_file() else None
         rows = {} if results is None else _rows_by_name(results)
-        kept = [_Kept(path, rows.get(path.name)) for path in paths]
+        recordings = [_Kept(path, rows.get(path.name)) for path in paths]
         self._answer = _answer_of(results)
         self._measures = _measures_of(self._answer, rows)
         self._factors = [] if results is None else list(results.factors)
         self._question = "" if results is None else str(results.study.get("question", ""))
         if self._answer:
-            kept.sort(key=lambda one: -_worst_first(self._answer, one.row))
-        self._kept = {one.path.name: one for one in kept}
+            recordings.sort(key=lambda one: -_worst_first(self._answer, one.row))
+        self._kept = {one.path.name: one for one in recordings}
 
     def find(self, name: str) -> Path:
         """Return the recording of that name.
@@ -117,7 +117,7 @@ def _measures_of(answer: str, rows: Mapping[str, Row]) -> list[str]:
     if row is None:
         return []
     usual = [name for name in SHOWN if name in row and name != answer]
-    return [*([answer] if answer in row else []), *usual[:MOST_MEASURES]]
+    return [*([answer] if answer in row else []), *usual[:MAX_MEASURES]]
 
 
 def _worst_first(answer: str, row: Row | None) -> float:

@@ -7,14 +7,14 @@ from collections import deque
 
 from dva_sim.console.wire.rows import LatencyFigures
 
-KEPT = 1000  # of the newest times
+KEPT_TIMES = 1000  # of the newest times
 
 
 class Latencies:
     """Times of one kind [s]; only the newest are kept."""
 
     def __init__(self) -> None:
-        self._times: deque[float] = deque(maxlen=KEPT)
+        self._times: deque[float] = deque(maxlen=KEPT_TIMES)
         self._count = 0
 
     def add(self, seconds: float) -> None:
@@ -23,7 +23,7 @@ class Latencies:
         self._count += 1
 
     def line(self) -> LatencyFigures | None:
-        """Return the figures in milliseconds, of the newest `KEPT`; None without any."""
+        """Return the figures in milliseconds, of the newest `KEPT_TIMES`; None without any."""
         if not self._times:
             return None
         ordered = sorted(self._times)

@@ -130,8 +130,8 @@ class RobotActions:
     def _drive(self, client: str, hand: PageHand, speed: float, turn: float) -> None:
         window = self._windows.by_id[hand.robot]
         spec = window.robot.body.spec
-        wanted = speed * spec.max_speed, turn * spec.max_turn_rate
-        if window.hand.drive(client, *wanted).code == m.WRONG_MODE:
+        set_point = speed * spec.max_speed, turn * spec.max_turn_rate
+        if window.hand.drive(client, *set_point).code == m.WRONG_MODE:
             del self._hands[client]  # an emergency, or a long silence, has ended it
 
     def gone(self, client: str) -> None:

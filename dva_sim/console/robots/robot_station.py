@@ -14,7 +14,7 @@ from dva_sim.network.sockets import PORT_TRIES
 from dva_sim.protocol import messages as m
 
 Then = Callable[[bool, str], object]
-OFF = "off"
+OFF_STATE = "off"
 REGISTERED = "registered"
 LISTENING = "listening"
 
@@ -41,7 +41,7 @@ class OwnStation:
         self._network = network
         self._host = host
         self._port = port
-        self.state = OFF
+        self.state = OFF_STATE
         self.dva = ""
         self.deaf: Callable[[bool], object] = lambda _: None
         self._problem = ""
@@ -68,7 +68,7 @@ class OwnStation:
             Refused: it is registered, or being registered.
         """
         device = self._robot.device
-        if self.state != OFF or self._asking:
+        if self.state != OFF_STATE or self._asking:
             raise Refused(f"it is {'asking already' if self._asking else self.state}")
         self.dva = dva
         self._asking = True
@@ -138,7 +138,7 @@ class OwnStation:
         self._robot.hang()
         device.leave()
         device.tell("is switched off", "link")
-        self.state = OFF
+        self.state = OFF_STATE
         self._asking = False
         self._problem = ""
         if not self._port:

@@ -89,12 +89,12 @@ class RobotWindow:
         for name, port in self.robot.sensors.items():
             values = port.read(now)
             stuck = name in self.faults.stuck
-            shown: SensorShown = {"name": name, "unit": port.unit, "stuck": stuck}
+            line: SensorShown = {"name": name, "unit": port.unit, "stuck": stuck}
             if len(values) > 3:
-                shown["least"] = min(values)
+                line["least"] = min(values)
             elif values:
-                shown["values"] = list(values)
-            yield shown
+                line["values"] = list(values)
+            yield line
 
 
 class RobotWindows:
@@ -201,8 +201,8 @@ class RobotWindows:
         body = robot.body
         faults = window.faults
         in_force = now < point.until
-        asked = (point.speed, point.turn_rate) if in_force else (0.0, 0.0)
-        speed, turn = body.motors.set_point(*self._limited(robot, *asked))
+        command = (point.speed, point.turn_rate) if in_force else (0.0, 0.0)
+        speed, turn = body.motors.set_point(*self._limited(robot, *command))
         return {
             "k": "robot",
             "t": round(1000 * now),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dva_sim.agents.robot.controller import STANDSTILL, Mode
 from dva_sim.agents.robot.robot import RobotAgent
 
-STILL = 0.02  # slower it stands [m/s, rad/s]
+STANDS_BELOW = 0.02  # slower it stands [m/s, rad/s]
 HELD_BACK = 0.25  # of the speed that was asked for: what creeps in contact is held back
 LAG = "held: this machine cannot keep up with real time"
 
@@ -22,10 +22,10 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     point = robot.set_point
     if body.jammed:
         return "it is stuck against something"
-    asked = abs(point.speed) if now < point.until else 0.0
-    if body.in_contact and STILL < asked > abs(body.speed) / HELD_BACK:
+    commanded = abs(point.speed) if now < point.until else 0.0
+    if body.in_contact and STANDS_BELOW < commanded > abs(body.speed) / HELD_BACK:
         return "something is in its way"
-    if abs(body.speed) > STILL or abs(body.turn_rate) > STILL:
+    if abs(body.speed) > STANDS_BELOW or abs(body.turn_rate) > STANDS_BELOW:
         return ""
     if not body.powered:
         return "its battery is empty"
@@ -36,7 +36,7 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
             return "waits for the first command: its connection is being opened"
         if now >= point.until:
             return _without_command(robot, now)
-        if abs(point.speed) < STILL and abs(point.turn_rate) < STILL:
+        if abs(point.speed) < STANDS_BELOW and abs(point.turn_rate) < STANDS_BELOW:
             return "it is asked to stand"
         return "it sets off, or is held back"
     if held_by_lag:

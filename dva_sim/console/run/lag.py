@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 LIMIT = 0.25  # behind real time; above, nobody drives by what is on the page [s]
-GOOD_FOR = 1.0  # below the limit for so long, driving may begin again [s]
+RECOVERY_S = 1.0  # below the limit for so long, driving may begin again [s]
 
 
 class LagRule:
@@ -35,7 +35,7 @@ class LagRule:
             self._begun = now
         if lag > LIMIT:
             self._bad_at = now
-        elif now - self._bad_at >= GOOD_FOR:
+        elif now - self._bad_at >= RECOVERY_S:
             self.held = False
         self.held_for = now - self._begun if self.held else 0.0
         return begins

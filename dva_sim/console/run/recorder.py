@@ -11,7 +11,7 @@ from typing_extensions import override
 from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.live.recording import LiveRecorder
 
-KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
+KEPT_PER_DRIVE = 200  # of each list of a drive, and of ended drives nothing but the last
 KEPT_DRIVES = 20
 KEPT_COMMANDS = 2000  # on their way
 KEPT_MESSAGES = 2000  # to robots, on their way
@@ -99,8 +99,8 @@ class ConsoleRecorder(Recorder):
 
     def _forget(self) -> None:
         for drive in self.drives:
-            for kept in (drive.frames, drive.commands, drive.applied, drive.intents):
-                del kept[:-KEPT]
+            for entries in (drive.frames, drive.commands, drive.applied, drive.intents):
+                del entries[:-KEPT_PER_DRIVE]
         over = [drive for drive in self.drives if drive.ended is not None][:-KEPT_DRIVES]
         for drive in over:
             self.drives.remove(drive)
@@ -108,14 +108,14 @@ class ConsoleRecorder(Recorder):
         for key in list(self._issued)[:-KEPT_COMMANDS]:
             del self._issued[key]
 
-    def _keep(self, kept: LiveRecorder, drive: DriveLog) -> None:
+    def _keep(self, recorder: LiveRecorder, drive: DriveLog) -> None:
         number = self._numbers[id(drive)]
         facts = [drive.robot, drive.operator, drive.event, drive.ordered]
         facts += [drive.started, drive.ended, drive.outcome]
-        kept.put_new("drive", drive.operator, number, facts, key=f"drive {number}")
+        recorder.put_new("drive", drive.operator, number, facts, key=f"drive {number}")
         done = self._done.setdefault(number, [0.0, 0.0])
         seen = [(f.captured, f.time) for f in drive.frames if f.time > done[0]]
         made = [command for command in drive.commands if command[0] > done[1]]
-        if (seen or made) and kept.put("drove", drive.operator, number, seen, made):
+        if (seen or made) and recorder.put("drove", drive.operator, number, seen, made):
             done[0] = seen[-1][1] if seen else done[0]
             done[1] = made[-1][0] if made else done[1]

@@ -17,15 +17,15 @@ from dva_sim.simulation.scenario import Scenario, mean_processing_s, start_needs
 _LAWS = ("delay_law", "delay_log")  # of which jitter takes the place
 
 
-def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
+def changed(link: LinkConfig, changes: Mapping[str, float]) -> LinkConfig:
     """Return a link with other numbers in both directions; jitter is kept within the delay.
 
     Raises:
         ConfigError: what cannot be, such as a rate where a recorded trace gives it.
     """
-    if "rate_bps" in wanted and (link.trace_up or link.trace_down):
+    if "rate_bps" in changes and (link.trace_up or link.trace_down):
         raise ConfigError("the recorded trace gives this link's rate")
-    values = {key: value for key, value in wanted.items() if key in LinkConfig.model_fields}
+    values = {key: value for key, value in changes.items() if key in LinkConfig.model_fields}
     delay = values.get("delay_s", link.delay_s)
     values["jitter_s"] = min(values.get("jitter_s", link.jitter_s), delay)
     ways = {}
@@ -33,10 +33,10 @@ def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
         special = getattr(link, way)
         if special is not None:
             ways[way] = special.model_copy(update=dict.fromkeys(values))
-    gone: dict[str, Any] = dict.fromkeys(_LAWS) if wanted.get("jitter_s") else {}
+    gone: dict[str, Any] = dict.fromkeys(_LAWS) if changes.get("jitter_s") else {}
     if gone:
         ways = {way: special.model_copy(update=gone) for way, special in ways.items()}
-    if wanted.get("loss") is not None:
+    if changes.get("loss") is not None:
         gone["bursts"] = None
         ways = {way: special.model_copy(update={"bursts": None}) for way, special in ways.items()}
     made = link.model_copy(update=values | gone | ways)
@@ -85,10 +85,10 @@ class LinkSliders:
         run = self._run
         processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))
         if run.is_real:
-            shown: LinkShown = {"kind": "real", "processing_s": processing}
+            line: LinkShown = {"kind": "real", "processing_s": processing}
             if self._emulated:
-                shown |= {"delay_s": link.delay_s, "loss": link.loss}
-            return shown
+                line |= {"delay_s": link.delay_s, "loss": link.loss}
+            return line
         return {
             "kind": "modelled",
             "delay_s": link.delay_s,
@@ -101,27 +101,27 @@ class LinkSliders:
             "rate_trace": link.trace_up or link.trace_down,
         }
 
-    def change(self, given: Mapping[str, Any]) -> tuple[str, Scenario]:
+    def change(self, arguments: Mapping[str, Any]) -> tuple[str, Scenario]:
         """Change it: what is changed, in words, and a scenario with the time-outs it needs.
 
         Raises:
             ConfigError: what cannot be.
         """
         run = self._run
-        wanted = {key: given[key] for key in LINK_LIMITS if key in given}
-        if run.is_real and wanted.keys() - {"processing_s"}:
+        values = {key: arguments[key] for key in LINK_LIMITS if key in arguments}
+        if run.is_real and values.keys() - {"processing_s"}:
             raise ConfigError(EMULATED if self._emulated else TITLE)
-        self.link = changed(run.scenario.link, self._wanted | wanted)
-        self._wanted |= wanted
+        self.link = changed(run.scenario.link, self._wanted | values)
+        self._wanted |= values
         now = run.clock.now
         for pair in run.links.values():
             for each in pair:
                 each.change(now, self.link)
-        if "processing_s" in wanted:
-            self._change_processing(wanted["processing_s"])
+        if "processing_s" in values:
+            self._change_processing(values["processing_s"])
         scenario = with_link(run.scenario, self.link, self._wanted.get("processing_s"))
         run.be_patient(scenario)
-        text = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        text = ", ".join(f"{key} {value:g}" for key, value in values.items())
         if self.link.jitter_s < self._wanted.get("jitter_s", 0.0):
             text += f"; jitter is kept within the delay, at {self.link.jitter_s:g} s"
         run.recorder.tell(now, "console", f"link: {text}", "link")

@@ -179,12 +179,12 @@ class RobotSimulator:
         finally:
             self._processes.end()
             world.close()
-        found = verdicts(world.recorder, dict.fromkeys(OF_THE_DVA, EVENTS_UNKNOWN))
-        for verdict in found:
+        judged = verdicts(world.recorder, dict.fromkeys(OF_THE_DVA, EVENTS_UNKNOWN))
+        for verdict in judged:
             self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
-        refuse_unheld(found)
+        refuse_unheld(judged)
 
     def _run(self, world: RobotWorld) -> None:
         about = {"robot": world.robot.device.label}

@@ -44,7 +44,7 @@ from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.simulation.scenario import Scenario
 
 POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
-SOON = 0.05  # from one look at what has changed to the next, real time [s]
+LOOK_PERIOD_S = 0.05  # from one look at what has changed to the next, real time [s]
 PAGES = ["robots", "map", "audit"]
 LINK: Final[LinkShown] = {"kind": "real", "processing_s": 0.0}
 
@@ -211,7 +211,7 @@ class RobotWorld:
         self.clock.pulse(POSITIONS, self._tell_positions)
         self.clock.pulse(WINDOWS, self._tell_windows)
         self.clock.pulse(ROWS, self.tell_now)
-        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(LOOK_PERIOD_S, self._tell_news)
         self.clock.pulse(LOG_PERIOD, self._tell_logs)
         self.clock.pulse(TIDY, self.recorder.tidy)
 

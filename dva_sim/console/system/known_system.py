@@ -32,7 +32,7 @@ ALARM_AFTER: Final = 5.0  # without a word, two heartbeats long, its silence is 
 LOOK: Final = 0.1  # from one look whether it is time to ask to the next [s]
 ASK_SENSORS: Final = 10.0  # between questions about sensors and cameras [s]
 SOMEWHERE: Final = GeoFrame(0.0, 0.0)
-MOST_THINGS: Final = 250  # robots and guards that have joined from outside and are shown
+MAX_THINGS: Final = 250  # robots and guards that have joined from outside and are shown
 SHOWN: Final[dict[str, tuple[str, ThingBody]]] = {
     ROBOT: ("robot", UNKNOWN_ROBOT),
     GUARD: ("guard", UNKNOWN_PERSON),
@@ -166,12 +166,12 @@ class KnownSystem:
             self._ask_who()
 
     def _ask_who(self) -> None:
-        asked = self._asked = self.clock.now
+        asked_at = self._asked = self.clock.now
         self._is_asking = True
 
         def answered(reply: m.Reply) -> None:
             self._is_asking = False
-            self._round_trip = min(self.clock.now - asked, ANSWER_WITHIN)
+            self._round_trip = min(self.clock.now - asked_at, ANSWER_WITHIN)
             if self._was_silent and self.has_all_events:
                 self._ask_again()  # it may know nothing of an earlier life
             self._was_silent = False
@@ -212,8 +212,8 @@ class KnownSystem:
     def _number_all(self) -> None:
         """Give robots and guards from outside a number, which stays theirs."""
         self._met.update(self.state.devices)
-        shown = [id_tag for id_tag in self._foreign if id_tag in self.state.devices]
-        room = MOST_THINGS - len(shown)
+        foreign = [id_tag for id_tag in self._foreign if id_tag in self.state.devices]
+        room = MAX_THINGS - len(foreign)
         for id_tag, entry in self.state.devices.items():
             kind, body = SHOWN.get(entry.device.device_type, ("", {}))
             label = entry.device.label
@@ -256,10 +256,10 @@ class KnownSystem:
         """Return the label of a device."""
         return self.labels.get(id_tag, id_tag)
 
-    def named(self, given: str) -> str:
+    def named(self, text: str) -> str:
         """Return the name of a device by its id, or of things by their numbers, as in `0, 1`."""
         by_number = {str(each["i"]): each["label"] for each in self.things.all}
-        words = given.split(", ")
+        words = text.split(", ")
         return ", ".join(by_number.get(one, self.label_of(one)) for one in words)
 
     # --- the rest that is known ------------------------------------------------------------

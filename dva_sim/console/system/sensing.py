@@ -14,8 +14,8 @@ from dva_sim.protocol import messages as m
 
 FREQUENCY: Final = 0.5  # of the values [Hz]
 RENEW: Final = 20.0  # a third of what a subscription lasts for [s]
-MOST: Final = 8  # robots that are listened to at once
-MOST_SENSORS: Final = 16  # of one robot
+MAX_ROBOTS: Final = 8  # robots that are listened to at once
+MAX_SENSORS: Final = 16  # of one robot
 
 
 class SensorWatch:
@@ -45,7 +45,7 @@ class SensorWatch:
     ) -> None:
         self._device = device
         self._robot = robot
-        self.names = tuple(names[:MOST_SENSORS])
+        self.names = tuple(names[:MAX_SENSORS])
         self._rate_hz = rate_hz
         self._on_value = heard
         self._told = told or do_nothing
@@ -146,21 +146,21 @@ class WatchedSensors:
 
     def watch(self, numbers: list[int]) -> None:
         """Watch these robots, and no others."""
-        self._looked = numbers[:MOST]
+        self._looked = numbers[:MAX_ROBOTS]
         self.go_on()
 
     def go_on(self) -> None:
         """Begin where it has become known by now which sensors a robot has; end what is over."""
-        known = self._state.devices
-        looked = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in known]
-        wanted = [id_tag for id_tag in looked if id_tag and not known[id_tag].is_own]
-        for id_tag in [one for one in self._watches if one not in wanted]:
+        devices = self._state.devices
+        looked = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in devices]
+        id_tags = [id_tag for id_tag in looked if id_tag and not devices[id_tag].is_own]
+        for id_tag in [one for one in self._watches if one not in id_tags]:
             self._watches.pop(id_tag).end()
-            if id_tag in known:
-                known[id_tag].values.clear()
-        for id_tag in wanted:
-            if id_tag not in self._watches and known[id_tag].sensors:
-                self._watches[id_tag] = self._watch(known[id_tag])
+            if id_tag in devices:
+                devices[id_tag].values.clear()
+        for id_tag in id_tags:
+            if id_tag not in self._watches and devices[id_tag].sensors:
+                self._watches[id_tag] = self._watch(devices[id_tag])
 
     def _watch(self, device_state: DeviceState) -> SensorWatch:
         def heard(value: m.SensorValue) -> None:

@@ -106,9 +106,9 @@ class SystemState:
             self._leave(state)
             self._device.forget(id_tag)
 
-    def sensors(self, found: m.SensorList) -> None:
+    def sensors(self, sensor_list: m.SensorList) -> None:
         """Take the DVA's list of what the devices can show."""
-        for one in found.devices:
+        for one in sensor_list.devices:
             if (state := self.devices.get(one.device)) is not None:
                 state.camera = one.camera_url
                 state.sensors = one.sensors
@@ -116,14 +116,14 @@ class SystemState:
     def _meet(self, device: m.Device) -> None:
         """Subscribe to a device, again if its address has changed."""
         self._labels[device.id_tag] = device.label
-        known = self.devices.get(device.id_tag)
-        if known is not None and known.device.address == device.address:
-            known.device = device
-            known.listed = self._now
+        entry = self.devices.get(device.id_tag)
+        if entry is not None and entry.device.address == device.address:
+            entry.device = device
+            entry.listed = self._now
             return
-        if known is not None:
-            self._leave(known)
-        state = self.devices[device.id_tag] = known or DeviceState(device, self._now)
+        if entry is not None:
+            self._leave(entry)
+        state = self.devices[device.id_tag] = entry or DeviceState(device, self._now)
         state.device = device
         state.listed = self._now
         network = self._device.network

@@ -13,7 +13,7 @@ from dva_sim.protocol.event_kinds import severity_word
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
-MOST_OVER: Final = 50  # events that are over
+MAX_OVER: Final = 50  # events that are over
 
 
 def event_rows(
@@ -29,7 +29,7 @@ def event_rows(
     """
     events = agent.events
     over = sorted(number for number, status in events.items() if status.closed_for is not None)
-    numbers = (*over[-MOST_OVER:], *sorted(events.keys() - set(over)))
+    numbers = (*over[-MAX_OVER:], *sorted(events.keys() - set(over)))
     return [
         event_row(
             events[number],

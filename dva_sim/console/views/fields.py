@@ -14,8 +14,8 @@ from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.worlds.hazards import QUANTITIES, Surroundings
 from dva_sim.worlds.site import Site
 
-MOST_CELLS = 20_000  # of one field
-SMALLEST_CELL = 0.5  # side [m]
+MAX_CELLS = 20_000  # of one field
+MIN_CELL = 0.5  # side [m]
 SHARE = 0.05  # of a core that sampling may take: it is done so much the rarer
 FULL = {"smoke": 3.0, "gas": 0.1, "water": 0.2, "heat": 10.0}  # what 255 means; see `QUANTITIES`
 
@@ -41,7 +41,7 @@ class HazardFeed:
         self._contained = contained
         west, south, east, north = site.extent
         area = max(1.0, (east - west) * (north - south))
-        self._cell = max(SMALLEST_CELL, math.ceil(10 * math.sqrt(area / MOST_CELLS)) / 10)
+        self._cell = max(MIN_CELL, math.ceil(10 * math.sqrt(area / MAX_CELLS)) / 10)
         kinds = {what for i in incidents if not i.false_alarm for what in i.hazard.shows}
         self._kinds = [kind for kind in QUANTITIES if kind in kinds]
         self._fields: list[FieldShown] = []

@@ -140,8 +140,8 @@ class Logs:
 
     def batches(self) -> list[ExchangesLine]:
         """Return what is to be told now."""
-        found = (log.batch() for log in self._logs.values())
-        return [line for line in found if line is not None]
+        batches = (log.batch() for log in self._logs.values())
+        return [line for line in batches if line is not None]
 
     def _apply(self, log: MessageLog) -> None:
         log.look(log.name in self._looked, self._looked.get(log.name, False))

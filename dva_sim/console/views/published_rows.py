@@ -54,15 +54,15 @@ def robot_row(
     """Return a robot, as it says itself."""
     status = device_state.status
     holder = device_state.holder
-    known = status if isinstance(status, m.RobotStatus) else None
+    robot_status = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
-    is_driven = known is not None and known.mode == Mode.TELEOPERATION.value
+    is_driven = robot_status is not None and robot_status.mode == Mode.TELEOPERATION.value
     is_unheard = device_state.heard is not None and now - device_state.heard > SILENT_AFTER
     return {
         **_unknown_robot(
             number,
-            known.mode if known is not None else "unknown",
+            robot_status.mode if robot_status is not None else "unknown",
             emergency_of(device_state, now, labels),
         ),
         "stop_reason": UNHEARD if is_driven and is_unheard else "",

@@ -31,7 +31,7 @@ from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import features_of
 from dva_sim.worlds.tints import floor_tint
 
-MOST_FEATURES = 20_000
+MAX_FEATURES = 20_000
 RULES = {
     "S1": "A robot moves only by a command that came within the watchdog.",
     "S2": "One robot obeys one holder at a time.",
@@ -97,7 +97,7 @@ def patterns_of(own: str) -> list[PatternShown]:
 def site_of(site: Site) -> SiteShown:
     """Return the plan of a site, in metres and as GeoJSON in degrees."""
     tints: dict[str, str] = {}
-    shown: SiteShown = {
+    site_line: SiteShown = {
         "name": site.name,
         "extent_m": _rounded(site.extent),
         "origin": {
@@ -122,8 +122,8 @@ def site_of(site: Site) -> SiteShown:
         "exits_m": [_rounded(way.ends) for way in site.exits],
     }
     if not site.rooms:
-        shown["raster"] = raster_of(site)
-    return shown
+        site_line["raster"] = raster_of(site)
+    return site_line
 
 
 def _place_in(site: Site, room: str) -> Point | None:
@@ -154,7 +154,7 @@ def geojson_of(site: Site) -> dict[str, Any]:
         there = _to_degrees(site, feature.shape)
         properties = {"kind": feature.kind, **feature.properties}
         features.append({"type": "Feature", "properties": properties, "geometry": there})
-        if len(features) >= MOST_FEATURES:
+        if len(features) >= MAX_FEATURES:
             break
     return {"type": "FeatureCollection", "features": features}
 
@@ -193,10 +193,10 @@ def legend(incidents: Sequence[RunHazard]) -> list[LegendEntry]:
         "water": colours.WATER,
         "heat": colours.FIRE,
     }
-    shown: list[LegendEntry] = [
+    hazards_shown: list[LegendEntry] = [
         {"kind": kind, "field": True, "colour": colour} for kind, colour in fields.items()
     ]
-    return [*bodies, *kinds, *marks, *shown]
+    return [*bodies, *kinds, *marks, *hazards_shown]
 
 
 def _rounded(numbers: Any) -> Any:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dva_sim.console.web.phone_listener import PhoneListener
 from starlette.types import ASGIApp
 
-from dva_sim.console.wire.limits import MOST_BYTES
+from dva_sim.console.wire.limits import MAX_BYTES
 from dva_sim.serving.server import Server
 from dva_sim.serving.web_sockets import WireProtocol
 
@@ -42,10 +42,10 @@ def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
     """Return the server of an application; by https where it has a certificate, with its key."""
     return Server.of(
         app,
-        MOST_BYTES,
+        MAX_BYTES,
         ssl_certfile=certificate,
         ws=WireProtocol,
-        ws_max_size=MOST_BYTES,
+        ws_max_size=MAX_BYTES,
         ws_ping_interval=PING,
         ws_ping_timeout=PING,
         ws_per_message_deflate=False,
@@ -55,9 +55,9 @@ def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
 FAREWELL = 0.2  # for last words on their way [s]
 
 
-def main(given: Sequence[str] | None = None) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Serve until the simulation has ended; 0, or 1 if nothing can be served."""
-    options = _parser().parse_args(given)
+    options = _parser().parse_args(words)
     try:
         asyncio.run(run(options))
     except DvaSimError as error:
@@ -166,9 +166,9 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """Return the first message to the simulation: the console's address and its secrets."""
     base = address_of(own_address(host) if access.own.any_address else host.strip("[]"), port)
-    asked = access.tokens.are_asked
+    needs_token = access.tokens.are_asked
     addresses = {
-        role.name.lower(): f"{base}?token={access.tokens.of(role)}" if asked else base
+        role.name.lower(): f"{base}?token={access.tokens.of(role)}" if needs_token else base
         for role in (Role.LOOK, Role.DRIVE, Role.DISPATCH, Role.SUPERVISE)
     }
     return {"do": "serving", "port": port, "base": base, **addresses}

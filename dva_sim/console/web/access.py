@@ -41,15 +41,15 @@ class Tokens:
         """True if a token is required."""
         return bool(self.drive)
 
-    def role_of(self, shown: str) -> Role:
+    def role_of(self, token_text: str) -> Role:
         """Return the role of a token; all comparisons take the same time, whatever was shown."""
         if not self.are_asked:
             return Role.SUPERVISE
-        given = shown.encode("utf-8", "replace")
+        token = token_text.encode("utf-8", "replace")
         fits = [
             role
             for role in (Role.SUPERVISE, Role.DISPATCH, Role.DRIVE, Role.PHONE, Role.LOOK)
-            if hmac.compare_digest(given, self.of(role).encode()) and given
+            if hmac.compare_digest(token, self.of(role).encode()) and token
         ]
         return fits[0] if fits else Role.NOBODY
 
@@ -81,9 +81,9 @@ class Entrance:
         if not self.tokens.are_asked:
             return Role.SUPERVISE
         kind, _, bearer = headers.get("authorization", "").partition(" ")
-        shown = [query.get("token", ""), in_cookie(headers, self.cookie)]
-        shown.append(bearer.strip() if kind.lower() in ("bearer", "token") else "")
-        by_token = max(self.tokens.role_of(token) for token in shown)
+        tokens = [query.get("token", ""), in_cookie(headers, self.cookie)]
+        tokens.append(bearer.strip() if kind.lower() in ("bearer", "token") else "")
+        by_token = max(self.tokens.role_of(token) for token in tokens)
         return max(by_token, role_of(self.user(headers)))
 
     def user(self, headers: Mapping[str, str]) -> User | None:

@@ -58,12 +58,12 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
-def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:
+def asked_of(name: Any, arguments: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:
     """Return the validated request for the simulation.
 
     Args:
         name: Name of the action.
-        given: Its arguments.
+        arguments: Its arguments.
         labels: Labels of the robots, with their indices.
         silent: True to allow actions without an answer.
 
@@ -72,12 +72,12 @@ def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dic
     """
     action = ACTIONS.get(name) if isinstance(name, str) else None
     if action is None or not (action.has_answer or silent):
-        known = [name for name, one in ACTIONS.items() if one.has_answer or silent]
-        raise BadMessage(f"no such action; there are: {', '.join(known)}")
-    asked = {"do": name, **action.read(given, labels)}
+        names = [name for name, one in ACTIONS.items() if one.has_answer or silent]
+        raise BadMessage(f"no such action; there are: {', '.join(names)}")
+    request = {"do": name, **action.read(arguments, labels)}
     if name == "emergency":
-        asked.setdefault("robots", "all")
-    return asked
+        request.setdefault("robots", "all")
+    return request
 
 
 def id_of(value: Any) -> str:

@@ -158,9 +158,9 @@ _STARTS = ("http.response.start", "websocket.accept", "websocket.http.response.s
 
 
 def _with_headers(headers: Any) -> list[tuple[bytes, bytes]]:
-    given = {name.lower() for name, _ in headers}
+    names = {name.lower() for name, _ in headers}
     more = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
-    return [*headers, *(pair for pair in more if pair[0] not in given)]
+    return [*headers, *(pair for pair in more if pair[0] not in names)]
 
 
 def _unknown(path: str) -> Response:

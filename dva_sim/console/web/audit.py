@@ -32,7 +32,7 @@ from dva_sim.recordings.audit_log import (
     verify_plain,
 )
 
-MOST_ROWS = 1000  # in one answer
+MAX_ROWS = 1000  # in one answer
 
 
 class AuditPages:
@@ -53,8 +53,8 @@ class AuditPages:
         return await self._read(self._rows, int(after))
 
     def _rows(self, path: Path, after: int) -> Response:
-        rows = rows_of(path, after, MOST_ROWS)
-        body = {"rows": [plain_row(row) for row in rows], "more": len(rows) == MOST_ROWS}
+        rows = rows_of(path, after, MAX_ROWS)
+        body = {"rows": [plain_row(row) for row in rows], "more": len(rows) == MAX_ROWS}
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def measures(self, _: Request) -> Response:
@@ -99,8 +99,8 @@ def rows_of(path: Path, after: int = 0, most: int | None = None) -> list[AuditRo
 
 
 def _kept(path: Path) -> list[dict[str, Any]]:
-    kept: list[dict[str, Any]] = json.loads(path.read_text())
-    return kept
+    rows: list[dict[str, Any]] = json.loads(path.read_text())
+    return rows
 
 
 def _verified(path: Path) -> Verified:
@@ -108,13 +108,15 @@ def _verified(path: Path) -> Verified:
 
 
 def _checked(path: Path) -> Response:
-    found = _verified(path)
-    wrong = found.problem
+    verified = _verified(path)
+    wrong = verified.problem
     body: AuditCheck = {
-        "rows": found.rows,
-        "hash": found.head,
+        "rows": verified.rows,
+        "hash": verified.head,
         "problem": None if wrong is None else {"row": wrong.number, "text": wrong.text},
-        "doubts": [doubt for doubt in found.doubts if "not an end" not in doubt],  # it still runs
+        "doubts": [
+            doubt for doubt in verified.doubts if "not an end" not in doubt
+        ],  # it still runs
     }
     return JSONResponse(body, headers=NOT_KEPT)
 

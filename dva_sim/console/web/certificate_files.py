@@ -40,10 +40,10 @@ class KeptCertificates(NamedTuple):
 
 def data_folder() -> Path:
     """Return the folder of this user's data of the program, as the system has it."""
-    given = os.environ.get("XDG_DATA_HOME", "")
+    folder = os.environ.get("XDG_DATA_HOME", "")
     home = Path("~").expanduser()
-    if Path(given).is_absolute():
-        return Path(given) / "dva-sim"
+    if Path(folder).is_absolute():
+        return Path(folder) / "dva-sim"
     if sys.platform == "darwin":
         return home / "Library" / "Application Support" / "dva-sim"
     if sys.platform == "win32":

@@ -47,11 +47,11 @@ class Hosts:
     addresses: frozenset[Address]
 
     @classmethod
-    def of(cls, given: list[str]) -> Hosts:
+    def of(cls, hosts: list[str]) -> Hosts:
         """Return names and addresses, sorted out; what can be neither is left out."""
         names = set()
         addresses = set()
-        for one in given:
+        for one in hosts:
             try:
                 addresses.add(ipaddress.ip_address(one.strip("[]").partition("%")[0]))
             except ValueError:
@@ -145,12 +145,12 @@ def new_leaf(authority: Signed, hosts: Hosts, now: datetime) -> Signed:
         decipher_only=False,
     )
     server = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])
-    known = x509.AuthorityKeyIdentifier.from_issuer_public_key(authority.key.public_key())
+    identifier = x509.AuthorityKeyIdentifier.from_issuer_public_key(authority.key.public_key())
     builder = builder.add_extension(hosts.alternatives(), critical=False)
     builder = builder.add_extension(x509.BasicConstraints(False, None), critical=True)
     builder = builder.add_extension(usage, critical=True)
     builder = builder.add_extension(server, critical=False)
-    builder = builder.add_extension(known, critical=False)
+    builder = builder.add_extension(identifier, critical=False)
     builder = builder.add_extension(_identifier(key), critical=False)
     return Signed(builder.sign(authority.key, hashes.SHA256()), key)
 
@@ -160,10 +160,10 @@ def authority_fault(authority: Signed, hosts: Hosts, now: datetime) -> str:
     if authority.ends_before(now + timedelta(days=LEAF_DAYS)):
         return "it ends soon"
     try:
-        kept = authority.certificate.extensions.get_extension_for_class(x509.NameConstraints)
+        constraints = authority.certificate.extensions.get_extension_for_class(x509.NameConstraints)
     except x509.ExtensionNotFound:
         return "it is not bound to this machine"
-    allowed = set(kept.value.permitted_subtrees or ())
+    allowed = set(constraints.value.permitted_subtrees or ())
     if not allowed >= set(_constraints(hosts).permitted_subtrees or ()):
         return "this machine has other names or public addresses"
     return ""
@@ -183,10 +183,10 @@ def leaf_fault(leaf: Signed, authority: Signed, hosts: Hosts, now: datetime) -> 
     except (InvalidSignature, TypeError, ValueError):
         return "another authority has signed it"
     try:
-        kept = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
+        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
     except x509.ExtensionNotFound:
         return "it names no machine"
-    missing = set(hosts.alternatives()) - set(kept.value)
+    missing = set(hosts.alternatives()) - set(names.value)
     return "this machine has other names or addresses" if missing else ""
 
 

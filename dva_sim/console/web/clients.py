@@ -20,9 +20,9 @@ from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.limits import OWN_KEPT
 from dva_sim.console.wire.roles import Role
 
-MOST_CLIENTS = 64
+MAX_CLIENTS = 64
 REMEMBERED = 30.0  # a page that is gone may come back under its name for so long [s]
-MOST_PROGRAMS = 64
+MAX_PROGRAMS = 64
 PROGRAM_REMEMBERED = 600.0  # a program's seat is given back after this without a request [s]
 
 
@@ -136,7 +136,7 @@ class Clients:
 
     def is_full(self) -> bool:
         """Return True if no place for a page is free."""
-        return len(self.here()) >= MOST_CLIENTS
+        return len(self.here()) >= MAX_CLIENTS
 
     def join(self, role: Role, key: str = "", page: str = "") -> Client:
         """Let a page in, under its old name if it was here a moment ago and is not any more.
@@ -150,12 +150,16 @@ class Clients:
             key: Key of the page that it was; empty: none.
             page: Name that it gives itself.
         """
-        known = self._by_key(key)
-        if known is not None and known.role is role and _may_come_again(known, page):
-            known.is_here = True
-            known.page = page
-            known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
-            return known
+        client_there = self._by_key(key)
+        if (
+            client_there is not None
+            and client_there.role is role
+            and _may_come_again(client_there, page)
+        ):
+            client_there.is_here = True
+            client_there.page = page
+            client_there.feed = PageFeed(self._state, client_there.name, role >= Role.DRIVE)
+            return client_there
         return self._add(Client(self._new_name("c"), role, self._state, page))
 
     def add_program(self, role: Role, now: float) -> tuple[Client | None, Client | None]:
@@ -167,7 +171,7 @@ class Clients:
         """
         programs = [client for client in self._all.values() if client.asked and not client.is_here]
         least = None
-        if len(programs) >= MOST_PROGRAMS:
+        if len(programs) >= MAX_PROGRAMS:
             least = min(programs, key=lambda each: (each.role, each.asked))
             if least.role >= role:
                 return None, None
@@ -202,8 +206,8 @@ class Clients:
         return client
 
     def _by_key(self, key: str) -> Client | None:
-        shown = key.encode("utf-8", "replace")
-        fits = [c for c in self._all.values() if hmac.compare_digest(shown, c.key.encode())]
+        key_bytes = key.encode("utf-8", "replace")
+        fits = [c for c in self._all.values() if hmac.compare_digest(key_bytes, c.key.encode())]
         return fits[0] if fits else None
 
     def named(self, name: str) -> Client | None:
@@ -237,8 +241,8 @@ class Clients:
         logs: dict[str, bool] = {}
         tables: set[str] = set()
         for looks in (client.feed.looks for client in self.here()):
-            for name, wanted in looks.wanted.items():
-                logs[name] = logs.get(name, False) or wanted.publications
+            for name, log_filter in looks.wanted.items():
+                logs[name] = logs.get(name, False) or log_filter.publications
             tables |= looks.tables
         return logs, sorted(tables)
 
@@ -248,5 +252,5 @@ class Clients:
             client.wake.set()
 
 
-def _may_come_again(known: Client, page: str) -> bool:
-    return not known.is_here or (bool(page) and page == known.page)
+def _may_come_again(client: Client, page: str) -> bool:
+    return not client.is_here or (bool(page) and page == client.page)

@@ -120,17 +120,17 @@ class PageFeed:
             i: v for i, v in self._have_windows.items() if i in self.watches
         }
         for index in self.watches:
-            known = self._state.windows.get(index)
-            if known is not None and known.version > have.get(index, 0):
-                have[index] = known.version
-                return known.body
+            window = self._state.windows.get(index)
+            if window is not None and window.version > have.get(index, 0):
+                have[index] = window.version
+                return window.body
         return None
 
-    def _newer(self, kind: str, known: Versioned | None) -> str | None:
-        if known is None or known.version <= self._have.get(kind, 0):
+    def _newer(self, kind: str, newest: Versioned | None) -> str | None:
+        if newest is None or newest.version <= self._have.get(kind, 0):
             return None
-        self._have[kind] = known.version
-        return known.body
+        self._have[kind] = newest.version
+        return newest.body
 
     def _moved(self) -> str | None:
         state = self._state
@@ -151,8 +151,8 @@ class PageFeed:
         return body_of(state.story[-missing])
 
     def _others(self) -> str | None:
-        for seat, known in self._state.seats_short.items():
-            if seat != self._seat and known.version > self._have_seats.get(seat, 0):
-                self._have_seats[seat] = known.version
-                return known.body
+        for seat, newest in self._state.seats_short.items():
+            if seat != self._seat and newest.version > self._have_seats.get(seat, 0):
+                self._have_seats[seat] = newest.version
+                return newest.body
         return None

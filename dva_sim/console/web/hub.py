@@ -119,10 +119,10 @@ class Hub:
         elif what == "resync":
             client.feed.resync()
         elif what == "watch":
-            asked = read_arguments(
+            look = read_arguments(
                 OfRobots, {"robots": message.get("robots")}, self.simulation.labels
             )
-            client.watches = frozenset(asked["robots"])
+            client.watches = frozenset(look["robots"])
             client.feed.watches = client.watches
             self.watching()
         elif what == "look" and client.role is not Role.PHONE:
@@ -207,8 +207,8 @@ class Hub:
             return
         self._replace(client)
         driver = client.driver = Driver()
-        if known := self.simulation.state.seats.get(client.name):
-            driver.seat("{" + known.body)
+        if seat_line := self.simulation.state.seats.get(client.name):
+            driver.seat("{" + seat_line.body)
 
         def hear(text: str) -> None:
             self._hear_driver(client, driver, text)
@@ -244,15 +244,15 @@ class Hub:
             if not client.is_here and name not in WITHOUT_PAGE:
                 raise BadMessage("this page has lost its other connection; it may only stop")
             check_role(client.role, name)
-            asked = asked_of(name, message, self.simulation.labels, silent=True)
-            asked["client"] = client.name
+            request = asked_of(name, message, self.simulation.labels, silent=True)
+            request["client"] = client.name
             if not ACTIONS[name].has_answer:
-                self.simulation.send(asked)
+                self.simulation.send(request)
                 return
             if client.role is Role.PHONE and "robots" not in message:
-                asked.pop("robots", None)  # an emergency is for its own robot
-            asked |= {"id": id_of(key), "role": client.role.name.lower()}
-            self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
+                request.pop("robots", None)  # an emergency is for its own robot
+            request |= {"id": id_of(key), "role": client.role.name.lower()}
+            self.simulation.ask(request, lambda line: driver.answer(encode(line)))
         except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
             driver.answer(encode(line | {"text": str(error), "outcome": REFUSAL}))

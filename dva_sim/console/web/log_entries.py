@@ -61,11 +61,11 @@ class Entry:
     @classmethod
     def of(cls, line: list[Any]) -> Entry:
         """Build an entry from an exchange; see `ExchangesLine`."""
-        number, time, data, reply, took, published, *known = line
+        number, time, data, reply, took, published, *answered = line
         answer = None if reply is None else str(reply).encode("latin-1")
         request = str(data).encode("latin-1")
         entry = cls(number, time, request, answer, took, bool(published))
-        entry.code, entry.text, entry.sent = known or (None, "", len(request))
+        entry.code, entry.text, entry.sent = answered or (None, "", len(request))
         entry._read()
         return entry
 
@@ -136,10 +136,10 @@ def kind_of(data: bytes) -> str:
     A message is named by the first element after its header, or by the one in that if it groups
     several kinds; without a payload it is called by its own element.
     """
-    found = [name.decode() for name in _ELEMENT.findall(data[:1024])]
-    kind = found[1] if len(found) > 1 and found[0] == "msg" else "?"
-    after = max((found.index(name) for name in _ENDS if name in found), default=-1)
-    inner = found[after + 1 :] if after >= 0 else []
+    names = [name.decode() for name in _ELEMENT.findall(data[:1024])]
+    kind = names[1] if len(names) > 1 and names[0] == "msg" else "?"
+    after = max((names.index(name) for name in _ENDS if name in names), default=-1)
+    inner = names[after + 1 :] if after >= 0 else []
     if kind != "SimpleMsg" or not inner:
         return kind
     return str(inner[1] if len(inner) > 1 and inner[0] in _GROUPS else inner[0])
@@ -148,12 +148,12 @@ def kind_of(data: bytes) -> str:
 def header_of(data: bytes) -> dict[str, str]:
     """Return the elements of a header as they stand, of a message that may be broken."""
     start = data[:1024]
-    found = {}
+    header = {}
     for name in _HEADER:
         match = re.search(rb"<%s>([^<]{0,64})</%s>" % (name.encode(), name.encode()), start)
         if match:
-            found[name] = match[1].decode("utf-8", "replace").strip()
-    return found
+            header[name] = match[1].decode("utf-8", "replace").strip()
+    return header
 
 
 def payload_of(body: Any) -> str:

@@ -16,7 +16,15 @@ from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_entries import Entry
-from dva_sim.console.web.logs import AT_ONCE, KEPT, TICKS, WORDS, KeptLog, LogFilter, Looks
+from dva_sim.console.web.logs import (
+    ENTRIES_PER_LINE,
+    KEPT_ENTRIES,
+    TICKS,
+    WORDS,
+    KeptLog,
+    LogFilter,
+    Looks,
+)
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, problem
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.roles import Role
@@ -48,12 +56,12 @@ class LogRequests:
             return problem(400, "before should be a whole number")
         looks = Looks(self._logs, request.scope[ROLE] >= Role.DRIVE)
         try:
-            wanted = looks.filter(_given(request))
+            log_filter = looks.filter(_given(request))
         except BadMessage as error:
             return problem(400, str(error))
         below = int(before) if before else None
-        found = log.find(wanted, self._logs.names, below, AT_ONCE)
-        lines = [looks.brief(entry) for entry in found]
+        entries = log.find(log_filter, self._logs.names, below, ENTRIES_PER_LINE)
+        lines = [looks.brief(entry) for entry in entries]
         return JSONResponse({"lines": lines, "total": log.newest}, headers=NOT_KEPT)
 
     async def entry(self, request: Request) -> Response:
@@ -68,11 +76,11 @@ class LogRequests:
         """`GET /api/logs/NAME/export?...`: lines that match, as an archive of messages."""
         log = self._log(request)
         try:
-            wanted = LogFilter.of(_given(request))
+            log_filter = LogFilter.of(_given(request))
         except BadMessage as error:
             return problem(400, str(error))
-        found = log.find(wanted, self._logs.names, None, KEPT)
-        data = await run_in_threadpool(archive, found, dict(self._logs.names))
+        entries = log.find(log_filter, self._logs.names, None, KEPT_ENTRIES)
+        data = await run_in_threadpool(archive, entries, dict(self._logs.names))
         name = f'attachment; filename="{re.sub(r"[^A-Za-z0-9-]", "_", log.name)}-log.zip"'
         headers = NOT_KEPT | {"Content-Disposition": name}
         return Response(data, headers=headers, media_type="application/zip")
@@ -93,12 +101,12 @@ class LogRequests:
 
 def _given(request: Request) -> dict[str, Any]:
     """Return a filter out of the address."""
-    asked = request.query_params
-    given: dict[str, Any] = {key: asked[key] for key in WORDS if key in asked}
-    since = asked.get("since", "0")
-    given["since"] = int(since) if since.isascii() and since.isdigit() else since
-    ticks = {key: asked[key] == "true" for key in TICKS if key in asked}
-    return given | ticks
+    query = request.query_params
+    words: dict[str, Any] = {key: query[key] for key in WORDS if key in query}
+    since = query.get("since", "0")
+    words["since"] = int(since) if since.isascii() and since.isdigit() else since
+    ticks = {key: query[key] == "true" for key in TICKS if key in query}
+    return words | ticks
 
 
 def whole(entry: Entry) -> dict[str, Any]:
@@ -129,14 +137,14 @@ def laid_out(data: bytes) -> tuple[str, list[dict[str, Any]]]:
     What cannot be laid out without a change to what is wrong with it is shown as it came.
     """
     plain = data.decode("utf-8", "backslashreplace")
-    shown = plain
+    text = plain
     mistakes = check_message(data)
     if "\n" not in plain and (pretty := _indented(plain)) is not None:
         again = check_message(pretty.encode())
         if [one.text for one in again] == [one.text for one in mistakes]:
-            shown = pretty
+            text = pretty
             mistakes = again
-    return shown, [{"line": p.line, "column": p.column, "text": p.text} for p in mistakes]
+    return text, [{"line": p.line, "column": p.column, "text": p.text} for p in mistakes]
 
 
 def _indented(text: str) -> str | None:

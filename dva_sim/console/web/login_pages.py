@@ -21,7 +21,7 @@ from dva_sim.console.web.rest import NOT_KEPT, TooStrange, bytes_of_body
 LOGIN_PAGE: Final = "/login"
 LOGOUT: Final = "/logout"
 LOGIN_STYLE: Final = "/static/css/trust.css"
-MOST_BYTES: Final = 4096  # of a form
+MAX_BYTES: Final = 4096  # of a form
 POLICY: Final = (
     "default-src 'none'; style-src 'self'; img-src 'self'; base-uri 'none'; form-action 'self'; "
     "frame-ancestors 'none'"
@@ -96,7 +96,7 @@ async def _form(request: Request) -> dict[str, str]:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/x-www-form-urlencoded":
         raise TooStrange(415, "the content type should be application/x-www-form-urlencoded")
-    data = await bytes_of_body(request, MOST_BYTES)
+    data = await bytes_of_body(request, MAX_BYTES)
     try:
         fields = parse_qs(data.decode(), max_num_fields=10)
     except ValueError:

@@ -18,9 +18,9 @@ from dva_sim.serving.users import User, UserFile, is_password_of
 LASTS: Final = 10 * 3600.0  # a session: a shift, and what is left of the one before [s]
 LOOK_AGAIN: Final = 1.0  # from one look whether the file has changed to the next [s]
 FREE_TRIES: Final = 3  # attempts that fail before the next one has to wait
-LONGEST_WAIT: Final = 60.0  # after many attempts that have failed [s]
-MOST_SESSIONS: Final = 1000
-MOST_TRIED: Final = 4096  # names and addresses whose failures are remembered
+MAX_WAIT: Final = 60.0  # after many attempts that have failed [s]
+MAX_SESSIONS: Final = 1000
+MAX_TRIED: Final = 4096  # names and addresses whose failures are remembered
 
 
 class TooSoon(Exception):
@@ -102,7 +102,7 @@ class Logins:
             self._failures.pop(key, None)
         token = secrets.token_urlsafe(24)
         self._sessions[token] = Session(name, self._clock() + LASTS)
-        while len(self._sessions) > MOST_SESSIONS:
+        while len(self._sessions) > MAX_SESSIONS:
             self._sessions.popitem(last=False)
         return token
 
@@ -111,9 +111,9 @@ class Logins:
         failures.count += 1
         if failures.count > FREE_TRIES:
             doublings = min(failures.count - FREE_TRIES, 10)
-            failures.until = now + min(LONGEST_WAIT, 2.0**doublings)
+            failures.until = now + min(MAX_WAIT, 2.0**doublings)
         self._failures.move_to_end(key)
-        while len(self._failures) > MOST_TRIED:
+        while len(self._failures) > MAX_TRIED:
             self._failures.popitem(last=False)
 
     def log_out(self, token: str) -> None:

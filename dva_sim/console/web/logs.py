@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 
 Line = dict[str, Any]
 
-KEPT: Final = 10_000  # exchanges of a log
+KEPT_ENTRIES: Final = 10_000  # exchanges of a log
 KEPT_BYTES: Final = 32 << 20  # of them
-AT_ONCE: Final = 200  # entries told to a page
+ENTRIES_PER_LINE: Final = 200  # entries told to a page
 WORDS: Final = ("device", "kind", "code", "text", "without")  # of a filter
 TICKS: Final = {"publications": False, "renewals": True}  # of a filter, and as usual
 RENEWED_WITHIN: Final = 15_000  # a device registers again and again in less than that [ms]
 TABLES: Final = ("devices",)
-MOST_LOGS: Final = 8  # that a page looks at
-MOST_KNOWN: Final = 256  # logs of which anything is kept
-MOST_NAMES: Final = 4096
+MAX_LOGS: Final = 8  # that a page looks at
+MAX_KNOWN: Final = 256  # logs of which anything is kept
+MAX_NAMES: Final = 4096
 
 
 @dataclass(frozen=True)
@@ -65,20 +65,20 @@ class LogFilter:
     since: int = 0
 
     @classmethod
-    def of(cls, given: Any) -> LogFilter:
+    def of(cls, fields_given: Any) -> LogFilter:
         """Parse the filter of a page.
 
         Raises:
             BadMessage: it makes no sense.
         """
-        if not isinstance(given, dict):
+        if not isinstance(fields_given, dict):
             raise BadMessage("a log's filter should be an object")
-        words = {key: given.get(key, "") for key in WORDS}
+        words = {key: fields_given.get(key, "") for key in WORDS}
         for key, value in words.items():
             if not isinstance(value, str) or len(value) > 200:
                 raise BadMessage(f"{key} should be a text of at most 200 characters")
-        since = given.get("since", 0)
-        ticks = {key: given.get(key, usual) for key, usual in TICKS.items()}
+        since = fields_given.get("since", 0)
+        ticks = {key: fields_given.get(key, usual) for key, usual in TICKS.items()}
         for key, value in ticks.items():
             if not isinstance(value, bool):
                 raise BadMessage(f"{key} should be true or false")
@@ -102,9 +102,9 @@ class LogFilter:
         if not self.device:
             return True
         header = entry.header
-        wanted = self.device.lower()
+        text = self.device.lower()
         ends = header.get("SourceID", ""), header.get("DestinationID", "")
-        return any(wanted in f"{end} {names.get(end, '')}".lower() for end in ends)
+        return any(text in f"{end} {names.get(end, '')}".lower() for end in ends)
 
     def _has_code(self, entry: Entry) -> bool:
         if not self.code:
@@ -116,8 +116,8 @@ class LogFilter:
         return str(entry.code) == self.code
 
     def _says(self, entry: Entry) -> bool:
-        wanted = self.text.encode()
-        return not wanted or wanted in entry.data or wanted in (entry.reply or b"")
+        text = self.text.encode()
+        return not text or text in entry.data or text in (entry.reply or b"")
 
 
 class KeptLog:
@@ -136,19 +136,19 @@ class KeptLog:
         self.name = name
         self.entries: dict[int, Entry] = {}
         self.changed = self.lost = self.bytes = self.newest = self.begun = 0
-        self._changes: deque[int] = deque(maxlen=KEPT)  # numbers
+        self._changes: deque[int] = deque(maxlen=KEPT_ENTRIES)  # numbers
 
     def take(self, entries: Iterable[Entry]) -> None:
         """Take in entries from the simulation."""
         for entry in entries:
-            known = self.entries.get(entry.number)
+            entry_there = self.entries.get(entry.number)
             if entry.number > self.newest:
                 self.lost += entry.number - self.newest - 1
                 self.newest = entry.number
-            elif known is None:
+            elif entry_there is None:
                 continue  # so old that it has been forgotten
             self.entries[entry.number] = entry  # one that is told again keeps its place
-            self.bytes += entry.size - (known.size if known is not None else 0)
+            self.bytes += entry.size - (entry_there.size if entry_there is not None else 0)
             self.changed += 1
             self._changes.append(entry.number)
         self._forget()
@@ -162,7 +162,7 @@ class KeptLog:
         self.begun += 1
 
     def _forget(self) -> None:
-        while len(self.entries) > KEPT or self.bytes > KEPT_BYTES:
+        while len(self.entries) > KEPT_ENTRIES or self.bytes > KEPT_BYTES:
             oldest = next(iter(self.entries))
             self.bytes -= self.entries.pop(oldest).size
 
@@ -171,14 +171,16 @@ class KeptLog:
         numbers = islice(reversed(self._changes), self.changed - change)
         return (entry for n in numbers if (entry := self.entries.get(n)) is not None)
 
-    def find(self, wanted: LogFilter, names: Names, before: int | None, most: int) -> list[Entry]:
+    def find(
+        self, log_filter: LogFilter, names: Names, before: int | None, most: int
+    ) -> list[Entry]:
         """Return the newest entries that match, below a number; the oldest first."""
-        found = (
+        matches = (
             entry
             for entry in reversed(self.entries.values())
-            if (before is None or entry.number < before) and wanted.takes(entry, names)
+            if (before is None or entry.number < before) and log_filter.takes(entry, names)
         )
-        return list(islice(found, most))[::-1]
+        return list(islice(matches, most))[::-1]
 
 
 class KeptLogs:
@@ -198,14 +200,14 @@ class KeptLogs:
 
     def of(self, name: str) -> KeptLog:
         """Return a log by its name, empty if nothing was told of it."""
-        if name not in self._logs and len(self._logs) >= MOST_KNOWN:
+        if name not in self._logs and len(self._logs) >= MAX_KNOWN:
             del self._logs[next(iter(self._logs))]
         return self._logs.setdefault(name, KeptLog(name))
 
     def meet(self, names: Names) -> None:
         """Learn labels; of those that nobody can remember all, the oldest are forgotten."""
         self.names |= names
-        while len(self.names) > MOST_NAMES:
+        while len(self.names) > MAX_NAMES:
             del self.names[next(iter(self.names))]
 
     def take(self, line: Line) -> None:
@@ -225,7 +227,7 @@ class KeptLogs:
         payload, time = self._registered.get(source, ("", 0))
         entry.renews = payload == entry.payload and 0 <= entry.time - time < RENEWED_WITHIN
         self._registered[source] = entry.payload, entry.time
-        while len(self._registered) > MOST_NAMES:
+        while len(self._registered) > MAX_NAMES:
             del self._registered[next(iter(self._registered))]
         self.meet({source: entry.label})
 
@@ -255,30 +257,30 @@ class Looks:
         Raises:
             BadMessage: it makes no sense.
         """
-        if not isinstance(logs, dict) or len(logs) > MOST_LOGS:
-            raise BadMessage(f"logs should be an object of at most {MOST_LOGS} logs")
+        if not isinstance(logs, dict) or len(logs) > MAX_LOGS:
+            raise BadMessage(f"logs should be an object of at most {MAX_LOGS} logs")
         if not isinstance(tables, list) or not set(tables) <= set(TABLES):
             raise BadMessage(f"tables should be some of: {', '.join(TABLES)}")
-        wanted = {str(name)[:64]: self.filter(one) for name, one in logs.items()}
-        same = {name for name, one in wanted.items() if self.wanted.get(name) == one}
+        filters = {str(name)[:64]: self.filter(one) for name, one in logs.items()}
+        same = {name for name, one in filters.items() if self.wanted.get(name) == one}
         self._seen = {name: seen for name, seen in self._seen.items() if name in same}
-        self.wanted, self.tables = wanted, frozenset(tables)
+        self.wanted, self.tables = filters, frozenset(tables)
 
-    def filter(self, given: Any) -> LogFilter:
+    def filter(self, fields_given: Any) -> LogFilter:
         """Set the page's filter; clients that may not act cannot search whole messages.
 
         Raises:
             BadMessage: it makes no sense.
         """
-        wanted = LogFilter.of(given)
-        return wanted if self.acts else replace(wanted, text="")
+        log_filter = LogFilter.of(fields_given)
+        return log_filter if self.acts else replace(log_filter, text="")
 
     def next(self) -> LogLine | None:
         """Return the next line of the logs that the page looks at; None if it has everything."""
-        for name, wanted in self.wanted.items():
+        for name, log_filter in self.wanted.items():
             log = self._logs.of(name)
             goes_on = name in self._seen and self._seen[name][2] == log.begun
-            line = self._more(log, wanted) if goes_on else self._first(log, wanted)
+            line = self._more(log, log_filter) if goes_on else self._first(log, log_filter)
             self._seen[name] = log.changed, log.lost, log.begun
             if line is not None:
                 return line
@@ -289,21 +291,23 @@ class Looks:
         brief = entry.brief(self._logs.names)
         return brief if self.acts else {**brief, "session": "", "payload": ""}
 
-    def _first(self, log: KeptLog, wanted: LogFilter) -> LogLine:
-        found = log.find(wanted, self._logs.names, None, AT_ONCE)
-        return self._line(log, True, 0, found)
+    def _first(self, log: KeptLog, log_filter: LogFilter) -> LogLine:
+        entries = log.find(log_filter, self._logs.names, None, ENTRIES_PER_LINE)
+        return self._line(log, True, 0, entries)
 
-    def _more(self, log: KeptLog, wanted: LogFilter) -> LogLine | None:
+    def _more(self, log: KeptLog, log_filter: LogFilter) -> LogLine | None:
         changed, lost, _ = self._seen[log.name]
-        found = {
+        entries = {
             entry.number: entry
             for entry in log.since(changed)
-            if wanted.takes(entry, self._logs.names)
+            if log_filter.takes(entry, self._logs.names)
         }
-        missed = max(0, len(found) - AT_ONCE) + log.lost - lost
-        if not found and not missed:
+        missed = max(0, len(entries) - ENTRIES_PER_LINE) + log.lost - lost
+        if not entries and not missed:
             return None
-        return self._line(log, False, missed, [found[n] for n in sorted(found)[-AT_ONCE:]])
+        return self._line(
+            log, False, missed, [entries[n] for n in sorted(entries)[-ENTRIES_PER_LINE:]]
+        )
 
     def _line(self, log: KeptLog, first: bool, missed: int, entries: Iterable[Entry]) -> LogLine:
         return {

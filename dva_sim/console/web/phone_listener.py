@@ -61,13 +61,13 @@ def listen_for_phones(
     try:
         port = sock.getsockname()[1]
         access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True, logins=logins)
-        shown = own_address(host) if access.own.any_address else host.strip("[]")
-        known = Hosts.of(own_hosts([*names, shown]))
-        kept = certificates(folder or data_folder() / "phones", known)
+        own_host = own_address(host) if access.own.any_address else host.strip("[]")
+        hosts = Hosts.of(own_hosts([*names, own_host]))
+        pair = certificates(folder or data_folder() / "phones", hosts)
     except BaseException:
         sock.close()
         raise
-    base = address_of(shown, port, "https")
+    base = address_of(own_host, port, "https")
     token = tokens.phone
-    door = PhoneDoor(f"{base}?token={token}" if token else f"{base}phone", kept.authority.der)
-    return PhoneListener(sock, access, kept.leaf, door, kept.notices)
+    door = PhoneDoor(f"{base}?token={token}" if token else f"{base}phone", pair.authority.der)
+    return PhoneListener(sock, access, pair.leaf, door, pair.notices)

@@ -23,7 +23,7 @@ from dva_sim.cameras.streams import BOUNDARY
 CONNECTED_WITHIN: Final = 5.0  # and answered [s]
 SILENCE: Final = 10.0  # without a byte a stream is over [s]
 CHUNK: Final = 65_536
-MOST_BYTES: Final = 4_000_000  # of one picture
+MAX_BYTES: Final = 4_000_000  # of one picture
 START: Final = b"\xff\xd8"  # of a JPEG
 KIND: Final = "multipart/x-mixed-replace"
 
@@ -56,10 +56,10 @@ class RemoteCamera:
             while (data := await self._next()) is not None:
                 buffer += data
                 *whole, buffer = buffer.split(self.boundary)
-                found = [jpeg for part in whole if (jpeg := _jpeg_in(part))]
-                for jpeg in found[-1:]:  # a viewer wants the newest
+                pictures = [jpeg for part in whole if (jpeg := _jpeg_in(part))]
+                for jpeg in pictures[-1:]:  # a viewer wants the newest
                     yield _part(jpeg)
-                if len(buffer) > MOST_BYTES:
+                if len(buffer) > MAX_BYTES:
                     return
         finally:
             await _close(self.writer)
@@ -103,8 +103,8 @@ async def _asked(host: str, port: int, path: str, query: str) -> RemoteCamera:
         protocol = h11.Connection(h11.CLIENT)
         target = f"{path or '/'}{'?' if query else ''}{query}"
         headers = [("Host", f"{host}:{port}"), ("Connection", "close")]
-        asked = protocol.send(h11.Request(method="GET", target=target, headers=headers))
-        writer.write((asked or b"") + (protocol.send(h11.EndOfMessage()) or b""))
+        head = protocol.send(h11.Request(method="GET", target=target, headers=headers))
+        writer.write((head or b"") + (protocol.send(h11.EndOfMessage()) or b""))
         event = await _event(reader, protocol)
         while isinstance(event, h11.InformationalResponse):
             event = await _event(reader, protocol)

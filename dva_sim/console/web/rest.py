@@ -17,7 +17,7 @@ from dva_sim.console.web.simulation import Answer
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
-from dva_sim.console.wire.limits import MOST_BYTES
+from dva_sim.console.wire.limits import MAX_BYTES
 from dva_sim.console.wire.roles import Role
 from dva_sim.worlds.geo import GeoFrame
 
@@ -115,11 +115,11 @@ class Rest:
     async def story(self, request: Request) -> Response:
         """`GET /api/story?from=N`: lines of the story from a number on, as far as they are kept."""
         state = self._simulation.state
-        asked = request.query_params.get("from", "0")
-        if not asked.isascii() or not asked.isdigit() or len(asked) > 9:
+        start = request.query_params.get("from", "0")
+        if not start.isascii() or not start.isdigit() or len(start) > 9:
             return problem(400, "from should be a whole number")
         oldest = state.story_count - len(state.story)
-        first = min(max(int(asked), oldest), state.story_count)
+        first = min(max(int(start), oldest), state.story_count)
         lines = list(state.story)[first - oldest :]
         body = {"from": first, "next": state.story_count, "lines": lines}
         return JSONResponse(body, headers=NOT_KEPT)
@@ -135,11 +135,11 @@ class Rest:
             if name == "gone":
                 self._simulation.send({"do": "gone", "client": client})
                 return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
-            asked = asked_of(name, body.get("arguments", {}), self._simulation.labels)
+            action_request = asked_of(name, body.get("arguments", {}), self._simulation.labels)
             key = id_of(body.get("id"))
-            if ACTIONS[asked["do"]].seats and "key" not in body:
-                return await self._do_in_new_seat(asked, key, role)
-            return self._answer(await self._do(asked, key, client, role))
+            if ACTIONS[action_request["do"]].seats and "key" not in body:
+                return await self._do_in_new_seat(action_request, key, role)
+            return self._answer(await self._do(action_request, key, client, role))
         except NotAllowed as error:
             return problem(403, str(error))
         except BadMessage as error:
@@ -150,12 +150,12 @@ class Rest:
         try:
             body = await body_of_request(request)
             role = request.scope[ROLE]
-            asked = asked_of("emergency", self._robots_of(body), self._simulation.labels)
-            known = self._hub.clients.find(body.get("key"), role)  # else anybody's, all the same
-            client = known.name if known is not None else _program(role)
+            action_request = asked_of("emergency", self._robots_of(body), self._simulation.labels)
+            driver = self._hub.clients.find(body.get("key"), role)  # else anybody's, all the same
+            client = driver.name if driver is not None else _program(role)
             key = body.get("id")
             key = key if is_id(key) else secrets.token_hex(8)  # a stop is not refused for its id
-            return self._answer(await self._do(asked, key, client, role))
+            return self._answer(await self._do(action_request, key, client, role))
         except BadMessage as error:
             return problem(400, str(error))
 
@@ -165,13 +165,13 @@ class Rest:
         labels = self._simulation.labels
         if not isinstance(named, list):
             return {"robots": named}
-        known = [
+        robots = [
             one
             for one in named
             if (isinstance(one, str) and one in labels)
             or (type(one) is int and one in labels.values())
         ]
-        return {"robots": known or "all"}
+        return {"robots": robots or "all"}
 
     def _client(self, body: dict[str, Any], role: Role) -> str:
         """Return the name of the page or program that asks.
@@ -180,31 +180,31 @@ class Rest:
             NotAllowed: it shows no key that belongs to a seat of its role.
         """
         if "key" in body:
-            known = self._hub.clients.find(body["key"], role)
-            if known is None:
+            client = self._hub.clients.find(body["key"], role)
+            if client is None:
                 raise NotAllowed("key: no open page and no program of this role has this key")
-            if known.asked:
-                known.asked = time.monotonic()
-            return known.name
+            if client.asked:
+                client.asked = time.monotonic()
+            return client.name
         if "client" in body:
             raise NotAllowed("client: a name opens no seat; send the key of that page or program")
         return _program(role)
 
-    async def _do_in_new_seat(self, asked: Answer, key: str, role: Role) -> Response:
+    async def _do_in_new_seat(self, action_request: Answer, key: str, role: Role) -> Response:
         """Let a program sit down; the answer has the key for its later requests."""
         program = self._hub.new_program(role)
         if program is None:
             return problem(503, "too many programs have a seat")
-        line = await self._do(asked, key, program.name, role)
+        line = await self._do(action_request, key, program.name, role)
         if not line.get("ok"):
             self._hub.dismiss(program)
             return self._answer(line)
         return self._answer(line | {"client": program.name, "key": program.key})
 
-    async def _do(self, asked: Answer, key: str, client: str, role: Role) -> Answer:
+    async def _do(self, action_request: Answer, key: str, client: str, role: Role) -> Answer:
         """Ask the simulation, and wait until it has answered."""
         return await self._simulation.answer(
-            asked | {"id": key, "client": client, "role": role.name.lower()}
+            action_request | {"id": key, "client": client, "role": role.name.lower()}
         )
 
     def _answer(self, line: Answer) -> Response:
@@ -227,7 +227,7 @@ async def body_of_request(request: Request) -> dict[str, Any]:
     if kind != "application/json":
         raise TooStrange(415, "the content type should be application/json")
     try:
-        return read(await bytes_of_body(request, MOST_BYTES))
+        return read(await bytes_of_body(request, MAX_BYTES))
     except BadMessage as error:
         raise BadMessage(f"the body {error}") from None
 

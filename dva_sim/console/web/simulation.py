@@ -18,11 +18,11 @@ from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, Asked, Queueing
 from dva_sim.console.wire.kinds import Labels
 from dva_sim.console.wire.limits import (
-    MOST_ACTIONS,
-    MOST_ASKING,
-    MOST_BATCHES,
-    MOST_PENDING,
-    MOST_URGENT,
+    MAX_ACTIONS,
+    MAX_ASKING,
+    MAX_BATCHES,
+    MAX_PENDING,
+    MAX_URGENT,
     SILENCE,
 )
 from dva_sim.console.wire.seats import REFUSAL
@@ -47,17 +47,17 @@ class OutgoingLines:
         self._samples: dict[str, deque[Asked]] = {}
         self.refused = 0
 
-    def put(self, asked: Asked) -> bool:
+    def put(self, request: Asked) -> bool:
         """Add a line: whether there was room."""
-        kind = asked["do"]
-        client = asked.get("client", "")
-        known = ACTIONS.get(kind) or OF_THE_WEB.get(kind)
-        waits = known.waits if known is not None else Queueing.IN_TURN
+        kind = request["do"]
+        client = request.get("client", "")
+        action = ACTIONS.get(kind) or OF_THE_WEB.get(kind)
+        waits = action.waits if action is not None else Queueing.IN_TURN
         if waits is Queueing.NEWEST:
-            self._newest[client, kind] = asked
+            self._newest[client, kind] = request
             return True
         if waits is Queueing.BATCH:
-            self._samples.setdefault(client, deque(maxlen=MOST_BATCHES)).append(asked)
+            self._samples.setdefault(client, deque(maxlen=MAX_BATCHES)).append(request)
             return True
         if kind == "gone":
             for hand in ("input", "manual"):
@@ -65,37 +65,37 @@ class OutgoingLines:
             self._samples.pop(client, None)
         is_urgent = waits is Queueing.FIRST
         queue = self._urgent if is_urgent else self._actions
-        if len(queue) >= (MOST_URGENT if is_urgent else MOST_ACTIONS):
+        if len(queue) >= (MAX_URGENT if is_urgent else MAX_ACTIONS):
             self.refused += 1
             return False
-        queue.append(asked)
+        queue.append(request)
         return True
 
     def next(self) -> bytes | None:
         """Return the next line to write, with its end; None if there is nothing to say."""
         if self._urgent:
-            asked = self._urgent.popleft()
+            request = self._urgent.popleft()
         elif self._actions:
-            asked = self._actions.popleft()
+            request = self._actions.popleft()
         elif self._newest:
-            asked = self._newest.pop(next(iter(self._newest)))
+            request = self._newest.pop(next(iter(self._newest)))
         elif self._samples:
-            asked = self._next_samples()
+            request = self._next_samples()
         else:
             return None
-        return json.dumps(asked, separators=(",", ":")).encode() + b"\n"
+        return json.dumps(request, separators=(",", ":")).encode() + b"\n"
 
     def _next_samples(self) -> Asked:
         """Return the next samples, of each phone in turn."""
         client = next(iter(self._samples))
         waiting = self._samples.pop(client)
-        asked = waiting.popleft()
+        request = waiting.popleft()
         if waiting:
             self._samples[client] = waiting
-        return asked
+        return request
 
 
-MOST_COMPLAINTS = 20
+MAX_COMPLAINTS = 20
 
 Answer = dict[str, Any]
 OnAnswer = Callable[[Answer], object]
@@ -156,7 +156,7 @@ class Simulation:
                 self._take_line(json.loads(text))
             except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
                 self._complaints += 1
-                if self._complaints <= MOST_COMPLAINTS:
+                if self._complaints <= MAX_COMPLAINTS:
                     words = "dva-sim: a line of the simulation makes no sense"
                     print(f"{words}: {error!r}", file=sys.stderr)
 
@@ -188,37 +188,37 @@ class Simulation:
 
     # --- what it is asked for ------------------------------------------------------------
 
-    def send(self, asked: Asked) -> bool:
+    def send(self, request: Asked) -> bool:
         """Ask for something that has no answer: False if it cannot be said."""
-        if self._pipe is None or not self._pipe.is_open or not self._asked.put(asked):
+        if self._pipe is None or not self._pipe.is_open or not self._asked.put(request):
             return False
         self._pipe.flush()
         return True
 
-    def ask(self, asked: Asked, on_answer: OnAnswer) -> None:
+    def ask(self, request: Asked, on_answer: OnAnswer) -> None:
         """Send a request; `on_answer` receives the reply, which may be that the queue is full.
 
         Ids are those of the client that asks: the same id of another one is another question.
         """
-        given = asked["id"]
-        key = f"{asked['client']}/{given}"
+        number = request["id"]
+        key = f"{request['client']}/{number}"
 
         def answered(line: Answer) -> None:
-            on_answer(line | {"id": given})
+            on_answer(line | {"id": number})
 
         if self.ended.is_set():
             answered({"k": "done", "ok": False, "text": self.why, "outcome": REFUSAL})
             return
-        action = ACTIONS[asked["do"]]
+        action = ACTIONS[request["do"]]
         is_urgent = action.waits is Queueing.FIRST
         waiting = self._pending.get(key)
-        if waiting is not None and is_urgent and len(waiting) >= MOST_ASKING:
+        if waiting is not None and is_urgent and len(waiting) >= MAX_ASKING:
             waiting.pop(0)  # repeated questions: the newest ones get the answer
-        if waiting is not None and len(waiting) < MOST_ASKING:
+        if waiting is not None and len(waiting) < MAX_ASKING:
             waiting.append(answered)
             return
-        full = waiting is not None or (len(self._pending) >= MOST_PENDING and not is_urgent)
-        if full or not self.send(asked | {"id": key}):
+        full = waiting is not None or (len(self._pending) >= MAX_PENDING and not is_urgent)
+        if full or not self.send(request | {"id": key}):
             answered({"k": "done", "ok": False, "text": "too many requests at once; try again"})
             return
         self._pending[key] = [answered]
@@ -231,11 +231,11 @@ class Simulation:
             text = f"no answer within {patience:g} s"
             self._answer({"k": "done", "id": key, "ok": False, "text": text, "late": True})
 
-    async def answer(self, asked: Asked) -> Answer:
+    async def answer(self, request: Asked) -> Answer:
         """Ask for something and wait for the answer."""
-        found: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        self.ask(asked, lambda line: None if found.done() else found.set_result(line))
-        return await found
+        reply: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
+        self.ask(request, lambda line: None if reply.done() else reply.set_result(line))
+        return await reply
 
     def close(self) -> None:
         """Ask for nothing more."""

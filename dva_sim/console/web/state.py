@@ -25,7 +25,7 @@ LATEST = (
     *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
     *("story_so_far", "shelf"),
 )
-MOST_SEATS = 256  # of which anything is remembered
+MAX_SEATS = 256  # of which anything is remembered
 
 
 class Versioned(NamedTuple):
@@ -142,17 +142,17 @@ class RunState:
 
     def _take_seat(self, line: Line) -> None:
         seat = str(line["seat"])
-        if seat not in self.seats and len(self.seats) >= MOST_SEATS:
+        if seat not in self.seats and len(self.seats) >= MAX_SEATS:
             self.forget_seat(next(iter(self.seats)))
         self.seats[seat] = Versioned(self.version, body_of(line))
         short = body_of(short_seat(line))
-        known = self.seats_short.get(seat)
-        if known is None or known.body != short:
+        newest = self.seats_short.get(seat)
+        if newest is None or newest.body != short:
             self.seats_short[seat] = Versioned(self.version, short)
 
     def _take_guard(self, line: Line) -> None:
         seat = str(line["seat"])
-        if seat not in self.guards and len(self.guards) >= MOST_SEATS:
+        if seat not in self.guards and len(self.guards) >= MAX_SEATS:
             del self.guards[next(iter(self.guards))]
         self.guards[seat] = Versioned(self.version, body_of(line))
 

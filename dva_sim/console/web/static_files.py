@@ -29,8 +29,8 @@ class PageFiles(StaticFiles):
             mimetypes.add_type(kind, suffix)
 
     @override
-    def file_response(self, *given: Any, **more: Any) -> Response:
-        response = super().file_response(*given, **more)
+    def file_response(self, *arguments: Any, **more: Any) -> Response:
+        response = super().file_response(*arguments, **more)
         response.headers["Cache-Control"] = "no-cache"
         return response
 

@@ -64,7 +64,7 @@ from dva_sim.console.wire.arguments import (
     WithReason,
 )
 from dva_sim.console.wire.kinds import BadMessage, Labels, adapter_of, read_arguments
-from dva_sim.console.wire.limits import LONG, PATIENCE
+from dva_sim.console.wire.limits import ANSWER_WAIT_S, LONG
 from dva_sim.console.wire.roles import Role
 
 # What the web process asks for: an action with its arguments, and who asks.
@@ -112,14 +112,14 @@ def _agree(_: dict[str, Any]) -> None:
     return None
 
 
-def check_times(asked: dict[str, Any]) -> None:
+def check_times(request: dict[str, Any]) -> None:
     """Check that each sample has a time, later than the one before.
 
     Raises:
         BadMessage: it is otherwise.
     """
-    at = asked["at"]
-    if len(at) != len(asked["xyz"]):
+    at = request["at"]
+    if len(at) != len(request["xyz"]):
         raise BadMessage("at and xyz should be equally long")
     if any(later <= one for one, later in pairwise(at)):
         raise BadMessage("at should rise")
@@ -160,20 +160,20 @@ class Action:
     @property
     def patience(self) -> float:
         """Time allowed for its answer [s]."""
-        return LONG if self.over_link else PATIENCE
+        return LONG if self.over_link else ANSWER_WAIT_S
 
-    def read(self, given: Any, labels: Labels | None = None) -> dict[str, Any]:
+    def read(self, arguments_given: Any, labels: Labels | None = None) -> dict[str, Any]:
         """Check its arguments; see `read_arguments`.
 
         Raises:
             BadMessage: they make no sense.
         """
         try:
-            asked = read_arguments(self.arguments, given, labels)
-            self.check(asked)
+            request = read_arguments(self.arguments, arguments_given, labels)
+            self.check(request)
         except BadMessage as error:
             raise BadMessage(f"{self.name}: {error}") from None
-        return asked
+        return request
 
 
 _OFTEN = "comes many times a second; what became of it is in the recording"

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from dva_sim.console.wire.kinds import (
-    MOST_ROBOTS,
+    MAX_ROBOTS,
     Kind,
     Label,
     Name,
@@ -34,24 +34,24 @@ LINK_LIMITS: Final[Mapping[str, tuple[float, float]]] = {
 }
 SLOWEST: Final = 0.1  # that a recording is played, as a multiple of real time
 FASTEST: Final = 20.0  # that anything goes, likewise
-MOST_PORT: Final = 65_534  # of a server: its publications have the next one
-MOST_SAMPLES: Final = 64  # of a phone, in one message
-MOST_MPS2: Final = 400.0  # no part of a phone measures more [m/s^2]
-MOST_MS: Final = 10**13  # of a clock [ms]
+MAX_PORT: Final = 65_534  # of a server: its publications have the next one
+MAX_SAMPLES: Final = 64  # of a phone, in one message
+MAX_MPS2: Final = 400.0  # no part of a phone measures more [m/s^2]
+MAX_MS: Final = 10**13  # of a clock [ms]
 STEPS: Final = (0.001, 100.0)  # of a phone's calibration [m/s^2]
 DELAYS: Final = (0.02, 5.0)  # of a phone, at most [s]
-LONGEST_LEG: Final = 3600.0  # of the tour [s]
-FAR: Final = 1e6  # of the origin: no site is so large [m]
+MAX_LEG: Final = 3600.0  # of the tour [s]
+MAX_COORDINATE_M: Final = 1e6  # of the origin: no site is so large [m]
 SENSOR_RATES: Final = (0.02, 20.0)  # of the values of a robot [Hz]
 SHIFT: Final = 8 * 3600  # no alarm is shelved for longer [s]
 
-Axes = Annotated[list[Annotated[float, Number(-MOST_MPS2, MOST_MPS2)]], Several(3, 3)]
+Axes = Annotated[list[Annotated[float, Number(-MAX_MPS2, MAX_MPS2)]], Several(3, 3)]
 EventNumber = Annotated[int, Whole(1, 10**9)]
-Millisecond = Annotated[float, Number(0, MOST_MS)]
+Millisecond = Annotated[float, Number(0, MAX_MS)]
 Count = Annotated[int, Whole(0, 2**53)]
-Coordinate = Annotated[float, Number(-FAR, FAR)]
+Coordinate = Annotated[float, Number(-MAX_COORDINATE_M, MAX_COORDINATE_M)]
 # Pictures that the page has drawn last: a robot's index and when the picture was taken [ms].
-Seen = Annotated[list[Annotated[list[Millisecond], Several(2, 2)]], Several(0, MOST_ROBOTS)]
+Seen = Annotated[list[Annotated[list[Millisecond], Several(2, 2)]], Several(0, MAX_ROBOTS)]
 # Decisions on the event, as the page knows it.
 Decisions = Annotated[int, Whole(0, 10**9)] | None
 Orientation = Annotated[
@@ -126,7 +126,7 @@ class PaceChange(TypedDict, total=False):
 class TourTime(OfRobot):
     """Time of a person for a leg of the tour."""
 
-    took_s: Annotated[float, Number(0, LONGEST_LEG)]
+    took_s: Annotated[float, Number(0, MAX_LEG)]
 
 
 class MarkAsked(TypedDict):
@@ -166,7 +166,7 @@ class PhoneIdentity(TypedDict):
     """Identity and server of a phone's registration."""
 
     server: Annotated[str, Text(1, 64)]
-    port: Annotated[int, Whole(1, MOST_PORT + 1)]
+    port: Annotated[int, Whole(1, MAX_PORT + 1)]
     label: Label
     type: Literal["Robot", "Remote Control", "Teleoperation"]
 
@@ -194,7 +194,7 @@ class CalibrationAsked(TypedDict):
 class PortAsked(TypedDict):
     """Port of the DVA's server."""
 
-    port: Annotated[int, Whole(1, MOST_PORT)]
+    port: Annotated[int, Whole(1, MAX_PORT)]
 
 
 class FakeAsked(TypedDict):
@@ -400,8 +400,8 @@ class SampleBatch(TypedDict):
     """Samples of a phone's sensor."""
 
     n: Count
-    at: Annotated[list[Millisecond], Several(1, MOST_SAMPLES)]
-    xyz: Annotated[list[Axes], Several(1, MOST_SAMPLES)]
+    at: Annotated[list[Millisecond], Several(1, MAX_SAMPLES)]
+    xyz: Annotated[list[Axes], Several(1, MAX_SAMPLES)]
     hand: bool
     orientation: Orientation
     seen: NotRequired[Seen]

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal, NotRequired, get_args, get_origin, get_t
 from typing_extensions import is_typeddict
 
 from dva_sim.console.wire.actions import ACTIONS
-from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS, MOST_PORT
+from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS, MAX_PORT
 from dva_sim.console.wire.audit_answers import AuditCheck, AuditMeasures
 from dva_sim.console.wire.lines import ToPage
 from dva_sim.recordings.audit_log import AuditRow
@@ -36,8 +36,8 @@ def javascript() -> str:
     parts = {
         "PATIENCE_MS": patience,
         "FASTEST": FASTEST,
-        "MOST_PORT": MOST_PORT,
-        "MOST_PROCESSING_S": LINK_LIMITS["processing_s"][1],
+        "MAX_PORT": MAX_PORT,
+        "MAX_PROCESSING_S": LINK_LIMITS["processing_s"][1],
     }
     head = "// Written by dva_sim/console/wire/generated.py.\n"
     return head + "".join(
@@ -47,13 +47,13 @@ def javascript() -> str:
 
 def line_types() -> str:
     """Return types of all lines sent to pages, of audit log replies, and of their parts."""
-    found: dict[type, str] = {}
+    declarations: dict[type, str] = {}
     for one in (*get_args(ToPage), AuditRow, AuditCheck, AuditMeasures):
-        _declare(one, found)
+        _declare(one, declarations)
     text = " | ".join(map(name_of, get_args(ToPage)))
     union = _typedef("A line sent to a page.", f"({text}) & {{s?: number}}", "ToPage")
     head = "// Written by dva_sim/console/wire/generated.py.\n"
-    return head + "".join((*found.values(), union)) + "export {};\n"
+    return head + "".join((*declarations.values(), union)) + "export {};\n"
 
 
 def name_of(declared: type) -> str:
@@ -61,9 +61,9 @@ def name_of(declared: type) -> str:
     return declared.__name__.removesuffix("Line").removesuffix("Shown")
 
 
-def _declare(declared: type, found: dict[type, str]) -> None:
+def _declare(declared: type, declarations: dict[type, str]) -> None:
     """Add a type behind all that it is made of."""
-    if declared in found:
+    if declared in declarations:
         return
     hints = get_type_hints(declared, include_extras=True)
     required = getattr(declared, "__required_keys__", hints)  # a dataclass has all
@@ -71,10 +71,10 @@ def _declare(declared: type, found: dict[type, str]) -> None:
     for name, hint in hints.items():
         optional = name not in required
         inner = get_args(hint)[0] if get_origin(hint) is NotRequired else hint
-        fields.append(f"{name}{'?' if optional else ''}: {_in_javascript(inner, found)}")
+        fields.append(f"{name}{'?' if optional else ''}: {_in_javascript(inner, declarations)}")
     about = (declared.__doc__ or "").strip().split("\n")[0]
     about = "" if about.startswith("dict(") else about  # which its own docstring is
-    found[declared] = _typedef(about, f"{{{', '.join(fields)}}}", name_of(declared))
+    declarations[declared] = _typedef(about, f"{{{', '.join(fields)}}}", name_of(declared))
 
 
 def _typedef(about: str, type_: str, name: str) -> str:
@@ -87,24 +87,24 @@ def _typedef(about: str, type_: str, name: str) -> str:
 _PLAIN: Final = {int: "number", float: "number", str: "string", bool: "boolean", Any: "any"}
 
 
-def _in_javascript(hint: Any, found: dict[type, str]) -> str:
+def _in_javascript(hint: Any, declarations: dict[type, str]) -> str:
     """Return a type as pages write it."""
     if hint in _PLAIN:
         return _PLAIN[hint]
     if hint in (None, type(None)):
         return "null"
     if is_typeddict(hint):
-        _declare(hint, found)
+        _declare(hint, declarations)
         return name_of(hint)
     inner = get_args(hint)
     if get_origin(hint) is Literal:
         return " | ".join(f"'{one}'" for one in inner)
     if get_origin(hint) in (dict, Mapping):
-        return f"Record<string, {_in_javascript(inner[1], found)}>"
+        return f"Record<string, {_in_javascript(inner[1], declarations)}>"
     if get_origin(hint) is list:
-        of = _in_javascript(inner[0], found)
+        of = _in_javascript(inner[0], declarations)
         return f"({of})[]" if " | " in of else f"{of}[]"
-    return " | ".join(_in_javascript(one, found) for one in inner)
+    return " | ".join(_in_javascript(one, declarations) for one in inner)
 
 
 FILES: Final = {"js/declared.js": javascript, "js/lines.js": line_types}

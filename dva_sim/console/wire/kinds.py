@@ -21,7 +21,7 @@ from typing import (
     get_type_hints,
 )
 
-MOST_ROBOTS = 64  # in one request
+MAX_ROBOTS = 64  # in one request
 Labels: TypeAlias = Mapping[str, int]
 
 
@@ -101,7 +101,7 @@ def _robot(value: Any, info: Any) -> int | str:
 
 
 def _robots(value: Any, info: Any) -> list[int | str]:
-    if not isinstance(value, list) or len(value) > MOST_ROBOTS:
+    if not isinstance(value, list) or len(value) > MAX_ROBOTS:
         raise ValueError("should be a list of robots")
     return list(dict.fromkeys(_robot(one, info) for one in value))
 
@@ -158,12 +158,12 @@ def adapter_of(arguments: type) -> Any:
     return TypeAdapter(with_config(strict=True, extra="forbid")(arguments))
 
 
-def read_arguments(arguments: type, given: Any, labels: Labels | None = None) -> dict[str, Any]:
+def read_arguments(arguments: type, values: Any, labels: Labels | None = None) -> dict[str, Any]:
     """Check arguments against their declaration; those that were given, as they are meant.
 
     Args:
         arguments: A `TypedDict` whose annotations are of this module.
-        given: From a client.
+        values: From a client.
         labels: Labels of the robots, with their indices; None accepts any label.
 
     Raises:
@@ -171,13 +171,13 @@ def read_arguments(arguments: type, given: Any, labels: Labels | None = None) ->
     """
     from pydantic import ValidationError  # late: start-up
 
-    if not isinstance(given, dict):
+    if not isinstance(values, dict):
         raise BadMessage("arguments should be an object")
     try:
-        read: dict[str, Any] = adapter_of(arguments).validate_python(given, context=labels)
+        read: dict[str, Any] = adapter_of(arguments).validate_python(values, context=labels)
     except ValidationError as error:
-        found = error.errors(include_url=False, include_input=False)
-        first = min(found, key=lambda one: one["type"] != "missing")
+        errors = error.errors(include_url=False, include_input=False)
+        first = min(errors, key=lambda one: one["type"] != "missing")
         raise BadMessage(_problem(arguments, first)) from None
     return read
 

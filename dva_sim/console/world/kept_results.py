@@ -55,10 +55,10 @@ class KeptResults:
         if out.exists() and not out.is_dir():
             raise ConfigError(f"{out} holds something already: give the name of a folder")
         part = {"scenario": scenario, "changes": dict(parse_changes(changes))}
-        asked = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
+        design = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
         question = f"What did people do in {scenario!r} at a console?"
         self._out = out
-        self._study = Study.model_validate({"question": question} | asked)
+        self._study = Study.model_validate({"question": question} | design)
         self._plan = StudyPlan.of(self._study)
         (self._job,) = self._plan.jobs
         assert isinstance(self._job.scenario, Scenario)

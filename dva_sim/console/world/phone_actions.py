@@ -29,7 +29,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 
 LIFTED = "stopped: the thumb was lifted"
-TURNED = "stopped: the phone's screen has turned"
+TURNED_TEXT = "stopped: the phone's screen has turned"
 
 
 class PhoneActions:
@@ -74,7 +74,7 @@ class PhoneActions:
         if phone.driven is not None and not batch.hand:
             self._driving.stop_client(client, LIFTED)
         elif phone.driven is not None and batch.orientation != phone.orientation:
-            self._driving.stop_client(client, TURNED)
+            self._driving.stop_client(client, TURNED_TEXT)
         phone.turn(batch.orientation)
         if phone.take(batch, now):  # a sensor that says the same again and again is silent
             self._seats.heard(client, now, batch.hand)
@@ -172,8 +172,8 @@ class PhoneActions:
             if not isinstance(reply.content, m.DeviceList):
                 on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
                 return
-            found = [_shown(one) for one in reply.content.devices]
-            on_result(True, f"{len(found)} devices", devices=found)
+            devices = [_shown(one) for one in reply.content.devices]
+            on_result(True, f"{len(devices)} devices", devices=devices)
 
         device.ask(device.dva, m.GetDeviceList(), answered, lambda: on_result(False, NO_ANSWER))
 
@@ -212,22 +212,22 @@ class PhoneActions:
 
         device.ask(device.dva, body, answered, lambda: unanswered(on_result))
 
-    def _asked(self, given: str) -> str:
+    def _asked(self, name: str) -> str:
         """Resolve the requested id; unknown ones pass, so that the DVA can refuse them.
 
         Raises:
             Refused: the device is unknown.
         """
-        return given if given in self._world.run.stage.labels else self._driving.robot(given)
+        return name if name in self._world.run.stage.labels else self._driving.robot(name)
 
     @does("phone_calibrate")
     def _calibrate(self, client: str, line: CalibrationAsked, on_result: OnResult) -> None:
         phone = self._phone(client)
         settings = settings_of(line)
-        kept = self._phones.keep_motion(phone, settings.keep)
+        motion_note = self._phones.keep_motion(phone, settings.keep)
         phone.calibrate(settings)
         later = " from the next drive on" if phone.driven is not None else ""
-        on_result(True, f"calibrated{later}{kept}")
+        on_result(True, f"calibrated{later}{motion_note}")
 
 
 def _shown(device: m.Device) -> DeviceShown:

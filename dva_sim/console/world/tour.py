@@ -21,7 +21,7 @@ FAR, LEAST = 5.0, 3.0  # of a goal [m]
 RADIUS = 0.6  # of the ring in which a robot has to stand [m]
 STEP = 0.2
 TURN = math.radians(15.0)
-TURNED = math.radians(45.0)  # from here on a goal asks for a turn
+TURNS_FROM_RAD = math.radians(45.0)  # from here on a goal asks for a turn
 WIDE, NARROW = (0.45, 0.3), (0.15,)  # room on both sides of a robot, beside its own radius [m]
 BASE = 1.0  # so near where it stands, a robot has room anyway [m]
 
@@ -63,7 +63,7 @@ def way_of(site: Site, robots: tuple[RobotAgent, ...]) -> FreeWay | None:
     """Return the longest way that all have: with room beside it and with a turn, if possible."""
     for rooms, turned in product((WIDE, NARROW), (True, False)):
         for room in rooms:
-            sides = [side for side in _sides() if (abs(side) >= TURNED) is turned]
+            sides = [side for side in _sides() if (abs(side) >= TURNS_FROM_RAD) is turned]
             ways = [
                 FreeWay(min(_free(site, robot, side, room) for robot in robots), side)
                 for side in sides

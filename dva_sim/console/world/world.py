@@ -242,13 +242,13 @@ class ConsoleWorld(ConsolePages):
             self.hold(why)
             self.note(why)
 
-    def change_link(self, given: Mapping[str, Any]) -> str:
+    def change_link(self, arguments: Mapping[str, Any]) -> str:
         """Change the link of all robots; what is changed, in words.
 
         Raises:
             ConfigError: what cannot be.
         """
-        text, scenario = self.sliders.change(given)
+        text, scenario = self.sliders.change(arguments)
         self.seating.equip(console_of(self.run.stage, scenario))
         return text
 

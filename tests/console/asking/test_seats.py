@@ -1,6 +1,6 @@
 import pytest
 
-from dva_sim.console.asking.seats import MOST_SEATS, RELOADED, Seats
+from dva_sim.console.asking.seats import MAX_SEATS, RELOADED, Seats
 from dva_sim.console.wire.limits import SILENT_AFTER
 
 LATER = RELOADED + 0.1  # [s]
@@ -12,7 +12,7 @@ def test_a_client_keeps_its_seat_and_the_lowest_free_one_is_given():
     assert seats.stand_up("b") == 1
     assert seats.stand_up("b") is None
     assert seats.sit("d") == 1
-    for number in range(MOST_SEATS):
+    for number in range(MAX_SEATS):
         seats.sit(f"more {number}")
     assert seats.sit("one too many") is None
 

@@ -54,7 +54,7 @@ def test_a_console_that_ends_writes_what_waits_and_says_that_it_ended(keeper):
 
 
 def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keeper, monkeypatch):
-    monkeypatch.setattr(audit_keeper, "AGAIN", 0.01)
+    monkeypatch.setattr(audit_keeper, "RETRY_DELAY_S", 0.01)
     assert problems_of(keeper, "before") == [""]
     keeper._log._file.execute("PRAGMA max_page_count = 1")
     big: dict[str, Any] = {"text": "x" * 100_000}
@@ -70,7 +70,7 @@ def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keepe
 
 
 def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(keeper, monkeypatch):
-    monkeypatch.setattr(audit_keeper, "MOST_WAITING", 0)
+    monkeypatch.setattr(audit_keeper, "MAX_WAITING", 0)
     reports: list[str] = []
     keeper.put(keeper.entry("one too many"), reports.append)
     monkeypatch.undo()

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from dva_sim.console.events.alarms import (
-    LONGEST_SHELF,
-    MOST_ALARMS,
+    MAX_ALARMS,
+    MAX_SHELF,
     PRIORITIES,
     AlarmCondition,
     Alarms,
@@ -127,7 +127,7 @@ def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new(burning):
 def test_no_shelf_lasts_longer_than_a_shift(burning):
     burning.shelve("event 1", 1e9, "ana", 0.0)
 
-    assert burning.known["event 1"].shelved_until == LONGEST_SHELF
+    assert burning.known["event 1"].shelved_until == MAX_SHELF
 
 
 def test_a_shelved_alarm_that_gets_graver_is_in_the_list_again():
@@ -200,21 +200,21 @@ def test_a_flood_ends_with_fewer_than_five_alarms_in_ten_minutes():
 
 def test_of_more_alarms_than_there_may_be_the_gravest_are_kept():
     alarms = Alarms()
-    many = [fire(number, "low") for number in range(MOST_ALARMS)]
+    many = [fire(number, "low") for number in range(MAX_ALARMS)]
     alarms.update([*many, fire(9999, "critical")], 0.0)
 
-    assert len(alarms.known) == MOST_ALARMS
+    assert len(alarms.known) == MAX_ALARMS
     assert "event 9999" in alarms.known
     assert alarms.left_out == 1
 
 
 def test_alarms_that_came_and_went_unseen_do_not_fill_the_memory():
     alarms = Alarms()
-    for number in range(3 * MOST_ALARMS):
+    for number in range(3 * MAX_ALARMS):
         alarms.update([fire(number)], float(number))
 
-    assert len(alarms.known) <= 2 * MOST_ALARMS
-    assert f"event {3 * MOST_ALARMS - 1}" in alarms.known
+    assert len(alarms.known) <= 2 * MAX_ALARMS
+    assert f"event {3 * MAX_ALARMS - 1}" in alarms.known
 
 
 KEYS = st.integers(0, 3)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from helpers.console.remote_console import OWN, NotedBench, attached
 
-from dva_sim.console.asking.answers import BYE
+from dva_sim.console.asking.answers import FAREWELL_PREFIX
 from dva_sim.console.bench import NOT_HERE, UNATTENDED
 from dva_sim.console.desk.console_actions import ConsoleActions
 from dva_sim.console.remote.piped_bench import PLAIN, PipedBench
@@ -141,7 +141,9 @@ def test_the_dva_learns_that_somebody_decides_before_the_first_decision(page, ac
 
 def test_the_dva_relies_on_nobody_once_the_last_page_is_gone(page):
     page.ask("room_join", name="ana")
-    page.actions.take({"do": "release", "id": f"{BYE}c1", "client": "c1", "role": "supervise"})
+    page.actions.take(
+        {"do": "release", "id": f"{FAREWELL_PREFIX}c1", "client": "c1", "role": "supervise"}
+    )
     assert page.system.bench.asked == ["supervise", "drive"]
 
 

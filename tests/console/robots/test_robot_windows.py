@@ -6,7 +6,7 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.robots.latencies import KEPT, Latencies
+from dva_sim.console.robots.latencies import KEPT_TIMES, Latencies
 
 
 @pytest.fixture
@@ -156,7 +156,7 @@ def test_latency_is_that_of_the_link_one_way_and_the_pictures_there_and_back(mon
 def test_figures_are_of_the_newest_times_alone():
     times = Latencies()
     assert times.line() is None
-    for n in range(KEPT + 100):
+    for n in range(KEPT_TIMES + 100):
         times.add(9.0 if n < 100 else (n - 100) / 1000)
     line = times.line()
     assert line == {
@@ -164,7 +164,7 @@ def test_figures_are_of_the_newest_times_alone():
         "median_ms": 499.5,
         "p95_ms": 949.0,
         "largest_ms": 999.0,
-        "count": KEPT + 100,
+        "count": KEPT_TIMES + 100,
     }
 
 

@@ -11,7 +11,7 @@ from lxml import etree
 from dva_sim.console.views.logs import CUT, Logs
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry
-from dva_sim.console.web.logs import AT_ONCE, KEPT, KEPT_BYTES, KeptLogs, Looks
+from dva_sim.console.web.logs import ENTRIES_PER_LINE, KEPT_BYTES, KEPT_ENTRIES, KeptLogs, Looks
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.limits import LOG_BATCH, LOG_BYTES
@@ -79,7 +79,7 @@ def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(logged)
     assert looks.next()["missed"] == 0
     logs.take(reported | {"lines": [line(n, b"x", None) for n in range(1205, 1405)]})
     assert (line_ := looks.next())["missed"] == 1203
-    assert len(line_["lines"]) == AT_ONCE
+    assert len(line_["lines"]) == ENTRIES_PER_LINE
 
 
 def test_large_messages_make_a_batch_short_and_are_cut(logged):
@@ -218,11 +218,15 @@ def test_a_page_sees_what_its_filter_takes(wanted, numbers):
 
 def test_a_log_keeps_the_newest_messages_and_so_many_bytes():
     logs = KeptLogs()
-    for first in range(1, KEPT + 1001, 200):
+    for first in range(1, KEPT_ENTRIES + 1001, 200):
         logs.take(batch(*(line(n, b"x", None) for n in range(first, first + 200))))
     kept = logs.of("dva")
-    assert (len(kept.entries), next(iter(kept.entries)), kept.newest) == (KEPT, 1001, KEPT + 1000)
-    for n in range(KEPT + 1001, KEPT + 6001):
+    assert (len(kept.entries), next(iter(kept.entries)), kept.newest) == (
+        KEPT_ENTRIES,
+        1001,
+        KEPT_ENTRIES + 1000,
+    )
+    for n in range(KEPT_ENTRIES + 1001, KEPT_ENTRIES + 6001):
         logs.take(batch(line(n, b"x" * CUT, None)))
     assert kept.bytes <= KEPT_BYTES
     assert kept.bytes == sum(entry.size for entry in kept.entries.values())

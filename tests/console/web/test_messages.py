@@ -10,7 +10,7 @@ from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, rea
 from dva_sim.console.web.simulation import OutgoingLines
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
-from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES
+from dva_sim.console.wire.limits import MAX_ACTIONS, MAX_BATCHES
 from dva_sim.serving.pipes import Lines
 
 LABELS = {"robot-1": 0, "robot-2": 3}
@@ -93,7 +93,7 @@ def test_input_and_samples_of_a_page_that_is_gone_are_forgotten(what):
 
 def test_actions_that_find_no_room_are_refused_but_an_emergency_still_does():
     lines = OutgoingLines()
-    assert all(lines.put({"do": "link", "client": "c1", "n": n}) for n in range(MOST_ACTIONS))
+    assert all(lines.put({"do": "link", "client": "c1", "n": n}) for n in range(MAX_ACTIONS))
     assert not lines.put({"do": "link", "client": "c1"})
     assert lines.put({"do": "emergency", "client": "c1"})
     assert lines.refused == 1
@@ -193,14 +193,14 @@ def test_what_makes_no_sense_is_refused_in_one_line(name, given, word):
 
 def test_samples_wait_in_their_order_and_the_oldest_of_too_many_are_lost():
     lines = OutgoingLines()
-    for n in range(MOST_BATCHES + 3):
+    for n in range(MAX_BATCHES + 3):
         lines.put({"do": "samples", "client": "c1", "n": n})
     lines.put({"do": "samples", "client": "c2", "n": 70})
     lines.put({"do": "stop", "client": "c1"})
     found = [(line["do"], line["client"], line.get("n")) for line in waiting(lines)]
     assert found[:3] == [("stop", "c1", None), ("samples", "c1", 3), ("samples", "c2", 70)]
     assert [n for what, client, n in found if client == "c1" and what == "samples"] == [
-        *range(3, MOST_BATCHES + 3)
+        *range(3, MAX_BATCHES + 3)
     ]
 
 

@@ -89,7 +89,7 @@ def test_where_nobody_answers_that_is_told(url):
 def test_a_camera_that_falls_silent_or_sends_without_end_is_over(monkeypatch):
     monkeypatch.setattr(relay, "SILENCE", 0.05)
     assert len(with_server(PICTURES, pictures, stays=True)) > 1
-    monkeypatch.setattr(relay, "MOST_BYTES", 100)
+    monkeypatch.setattr(relay, "MAX_BYTES", 100)
     assert with_server(HEAD + b"\r\n--cut\r\n" + bytes(10_000), pictures, stays=True) == [
         b"--dva-sim-frame\r\n"
     ]

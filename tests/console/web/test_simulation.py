@@ -13,7 +13,7 @@ from dva_sim.console.web.access import Role
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.wire import actions as declared
-from dva_sim.console.wire.limits import MOST_PENDING, SILENCE
+from dva_sim.console.wire.limits import MAX_PENDING, SILENCE
 
 
 class Clock:
@@ -93,7 +93,7 @@ def test_it_has_ended_when_it_says_so_or_is_gone():
 
 
 def test_who_waits_in_vain_is_told_after_a_while_and_longer_for_what_crosses_the_link(monkeypatch):
-    monkeypatch.setattr(declared, "PATIENCE", 0.001)
+    monkeypatch.setattr(declared, "ANSWER_WAIT_S", 0.001)
     monkeypatch.setattr(declared, "LONG", 0.002)
 
     async def story(simulation, clock, end):
@@ -143,15 +143,15 @@ def test_an_emergency_asked_for_again_and_again_is_answered_by_the_world_alone()
 def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
     async def story(simulation, clock, end):
         reports = []
-        for number in range(MOST_PENDING):
+        for number in range(MAX_PENDING):
             simulation.ask({"id": f"{number}", "do": "start", "client": "c1"}, reports.append)
             end.recv(1000)
-        simulation.ask({"id": f"{MOST_PENDING}", "do": "start", "client": "c1"}, reports.append)
-        assert [line["id"] for line in reports] == [f"{MOST_PENDING}"]
+        simulation.ask({"id": f"{MAX_PENDING}", "do": "start", "client": "c1"}, reports.append)
+        assert [line["id"] for line in reports] == [f"{MAX_PENDING}"]
         assert "too many" in reports[0]["text"]
         say(end, {"k": "bye", "why": "over"})
         await simulation.ended.wait()
-        assert [line["text"] for line in reports[1:]] == ["over"] * MOST_PENDING
+        assert [line["text"] for line in reports[1:]] == ["over"] * MAX_PENDING
         simulation.ask({"id": "after", "do": "start", "client": "c1"}, reports.append)
         assert (reports[-1]["id"], reports[-1]["text"]) == ("after", "over")
 

@@ -20,7 +20,7 @@ from dva_sim.console.wire import generated
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Asked, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.console.wire.kinds import BadMessage, Kind, hints_of
-from dva_sim.console.wire.limits import LONG, PATIENCE
+from dva_sim.console.wire.limits import ANSWER_WAIT_S, LONG
 from dva_sim.console.wire.roles import Role
 from dva_sim.network import realtime
 from dva_sim.recordings.audit_log import read_rows
@@ -233,7 +233,7 @@ def test_limits_are_those_of_what_they_limit():
     assert realtime.FASTEST == FASTEST
     with pytest.raises(BadMessage, match="from 0 to 5"):
         ACTIONS["link"].read({"delay_s": LINK_LIMITS["delay_s"][1] + 0.1})
-    assert [ACTIONS[name].patience for name in ("take", "link")] == [LONG, PATIENCE]
+    assert [ACTIONS[name].patience for name in ("take", "link")] == [LONG, ANSWER_WAIT_S]
 
 
 def test_a_hand_at_a_window_waits_as_one_at_the_stick_does():
@@ -250,4 +250,4 @@ def test_a_hand_at_a_window_waits_as_one_at_the_stick_does():
 
 def test_a_new_action_needs_no_more_than_its_declaration():
     action = Action("wave", "waves")
-    assert (action.audit, action.patience, action.read({})) == (Audit.OWN, PATIENCE, {})
+    assert (action.audit, action.patience, action.read({})) == (Audit.OWN, ANSWER_WAIT_S, {})

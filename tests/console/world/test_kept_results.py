@@ -12,7 +12,7 @@ from helpers.wording import unnamed
 
 import dva_sim
 from dva_sim.cli.program import call
-from dva_sim.console.run.recorder import KEPT
+from dva_sim.console.run.recorder import KEPT_PER_DRIVE
 from dva_sim.console.world.kept_results import KeptResults, name_of
 from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.execution.checkpoint import load_so_far
@@ -402,7 +402,7 @@ def test_memory_does_not_grow_with_what_was_kept(monkeypatch, tmp_path):
     (drive,) = page.world.recorder.drives
     assert drive.sent > 500
     for grown in (drive.frames, drive.commands, drive.applied, drive.intents):
-        assert len(grown) <= KEPT + 100
+        assert len(grown) <= KEPT_PER_DRIVE + 100
     assert sum(map(len, page.world.recorder.tracks.values())) <= 100
     results.write()
     results.close()

@@ -66,5 +66,5 @@ export const PATIENCE_MS = {
  "alarm_unshelve": 10000
 };
 export const FASTEST = 20.0;
-export const MOST_PORT = 65534;
-export const MOST_PROCESSING_S = 3.0;
+export const MAX_PORT = 65534;
+export const MAX_PROCESSING_S = 3.0;

@@ -13,7 +13,7 @@ import { steer } from '../net/wire.js';
 import { seenPictures } from './drawn.js';
 
 const EVERY_MS = 40;
-const LEAST_MS = 15;
+const MIN_MS = 15;
 
 /** @typedef {{speed: number, turn: number}} Wish shares of the limits; turn to the left positive */
 
@@ -107,7 +107,7 @@ function changed() {
   if (!same) wish.value = next;
   if (same && held.value === Boolean(last)) return;
   held.value = Boolean(last);
-  const left = LEAST_MS - (performance.now() - sent);
+  const left = MIN_MS - (performance.now() - sent);
   if (!held.value || left <= 0) send();
   else if (!soon) soon = window.setTimeout(send, left);
   keepSending();

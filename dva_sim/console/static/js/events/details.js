@@ -9,7 +9,7 @@ import { ageText, capital, plain } from '../ui/words.js';
 /** @typedef {import('../lines.js').Details} Details */
 /** @typedef {import('../lines.js').Step} Step */
 
-const AGAIN_MS = 3000; // others tick steps, too
+const REFRESH_MS = 3000; // others tick steps, too
 
 const known = signal(/** @type {Details | null} */ (null));
 
@@ -29,7 +29,7 @@ export function useDetails(event, change) {
   useEffect(() => {
     if (connection.peek() !== 'open') return undefined;
     load(event);
-    const timer = window.setInterval(() => load(event), AGAIN_MS);
+    const timer = window.setInterval(() => load(event), REFRESH_MS);
     return () => window.clearInterval(timer);
   }, [event, change, connection.value]);
   return known.value?.event === event ? known.value : null;

@@ -32,7 +32,7 @@ function Panel() {
   return onShift.value ? html`<${Shift} close=${() => (onShift.value = false)} />` : html`<${EventPanel} />`;
 }
 
-const AGAIN_MS = 1000;
+const REFRESH_MS = 1000;
 
 /** Register this console as a device at the DVA; its decisions are made in that name. */
 const join = () => act('room_join', { name: ownName.peek() });
@@ -44,7 +44,7 @@ function keepJoining() {
   const again = async () => {
     const done = await ask('room_join', { name: ownName.peek() });
     if (done.outcome === 'refused') showRefusal(done);
-    else if (!done.ok && !over) window.setTimeout(again, AGAIN_MS);
+    else if (!done.ok && !over) window.setTimeout(again, REFRESH_MS);
   };
   again();
   return () => {

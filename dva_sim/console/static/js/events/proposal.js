@@ -11,7 +11,7 @@ import { reason } from './shared.js';
 /** @typedef {import('../lines.js').Proposal} Proposal */
 /** @typedef {import('../lines.js').Candidate} Candidate */
 
-const AGAIN_MS = 4000;
+const REFRESH_MS = 4000;
 const SOON_MS = 500; // where it could not be asked, as while the page connects
 
 const known = signal(/** @type {Proposal & {t: number} | null} */ (null));
@@ -128,7 +128,7 @@ function keepAsking(event) {
     if (over) return;
     if (done?.ok && done.proposal) known.value = { ...done.proposal, t: done.t ?? worldNow() };
     refusal.value = done?.outcome === 'refused' ? done.text : '';
-    if (!refusal.value) window.setTimeout(ask, done?.ok ? AGAIN_MS : SOON_MS);
+    if (!refusal.value) window.setTimeout(ask, done?.ok ? REFRESH_MS : SOON_MS);
   };
   ask();
   return () => {

@@ -4,7 +4,7 @@ import { isFree, lettersOn } from './lettering.js';
 import { MODES, PERSON, ROBOT } from './marks.js';
 
 const LARGER = 1.25; // bodies are drawn a little larger than they are
-const LEAST_PX = /** @type {Record<string, number>} */ ({ robot: 15, guard: 13, bystander: 7 });
+const MIN_PX = /** @type {Record<string, number>} */ ({ robot: 15, guard: 13, bystander: 7 });
 const BATTERY = { width: 16, height: 3, low: 0.25 };
 const MANY = 40;
 
@@ -27,7 +27,7 @@ export const modeColour = (mode) => MODE_COLOURS[mode] ?? 'idle';
  * @param {number} scale
  */
 export function sizeOf(thing, scale) {
-  return Math.max(2 * LARGER * (thing.radius_m ?? 0) * scale, LEAST_PX[thing.kind] ?? 9);
+  return Math.max(2 * LARGER * (thing.radius_m ?? 0) * scale, MIN_PX[thing.kind] ?? 9);
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Field of view of a robot's camera on the plan: a cone clipped by walls. */
 
 const RAYS = 48;
-const LONGEST_M = 12;
+const MAX_M = 12;
 
 /**
  * Computes fields of view from nearby walls only; reuses the outline of a robot that stands still.
@@ -35,7 +35,7 @@ export class Sight {
    * @param {{field_of_view_deg: number, range_m: number}} camera
    */
   look(eye, camera) {
-    const reach = Math.min(LONGEST_M, camera.range_m);
+    const reach = Math.min(MAX_M, camera.range_m);
     const near = this.walls.filter((wall) => isNear(wall, eye, reach));
     const wide = (camera.field_of_view_deg * Math.PI) / 180;
     const path = new Path2D();

@@ -3,7 +3,7 @@ import { DARK, LIGHT } from '../palette.js';
 import { isFree, lettersOn } from './lettering.js';
 
 const WALL_M = 0.14;
-const LEAST_PX = 30;
+const MIN_PX = 30;
 
 /** @typedef {{path: Path2D, colour: string}} Floor */
 
@@ -94,7 +94,7 @@ export class Plan {
     ctx.fillStyle = colours['room-name'];
     for (const { name, x, y, width, height } of this.names) {
       const wide = width * affine.scale;
-      if (wide < LEAST_PX || height * affine.scale < 2 * letters) continue;
+      if (wide < MIN_PX || height * affine.scale < 2 * letters) continue;
       const [left, top] = affine.pixel(x, y);
       for (const text of [name, name.replace(/^\D+(?=\d)/, '')]) {
         const textWidth = ctx.measureText(text).width;

@@ -7,7 +7,7 @@
 import '../../vendor/leaflet.js';
 
 const L = /** @type {any} */ (globalThis).L;
-const MOST_PIXELS = 2;
+const MAX_PIXELS = 2;
 const MOVING_MS = 30; // what moves less than a pixel meanwhile is drawn every second frame
 const ROOM = 0.03;
 
@@ -129,7 +129,7 @@ export class MapView {
   viewChanged() {
     const size = this.map.getSize();
     const zero = this.map.latLngToContainerPoint([0, 0]);
-    const dpr = Math.min(MOST_PIXELS, window.devicePixelRatio || 1);
+    const dpr = Math.min(MAX_PIXELS, window.devicePixelRatio || 1);
     const scale = this.map.getZoomScale(this.map.getZoom(), 0);
     Object.assign(this.affine, { scale, left: zero.x, top: zero.y, dpr });
     Object.assign(this.affine, { width: size.x, height: size.y });

@@ -23,7 +23,7 @@ const STATES = /** @type {Record<string, string>} */ ({
   failed: 'Ended early',
 });
 const GOES_ON = ['under_way', 'waiting', 'replanning'];
-const MOST_PLACES = 64;
+const MAX_PLACES = 64;
 
 const kind = signal('go_to');
 const places = signal(/** @type {number[][]} */ ([]));
@@ -34,7 +34,7 @@ export const hasMissions = (i) => ['missions', 'both'].includes(driveOf(i)?.leve
 
 /** Take a tapped place: the goal, or one more of a patrol. @param {number} x @param {number} y */
 export function place(x, y) {
-  if (isPlaced.peek()) places.value = kind.peek() === 'patrol' ? [...places.peek(), [x, y]].slice(-MOST_PLACES) : [[x, y]];
+  if (isPlaced.peek()) places.value = kind.peek() === 'patrol' ? [...places.peek(), [x, y]].slice(-MAX_PLACES) : [[x, y]];
 }
 
 /** Places of the mission, for the map. @returns {import('../types.js').Goal[]} */

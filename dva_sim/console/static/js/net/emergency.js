@@ -5,7 +5,7 @@ import { notice, robots, rowOf, rows, you } from '../store.js';
 import { ask, newId } from './actions.js';
 import { worldNow } from './world_time.js';
 
-const AGAIN_MS = 1000; // from one attempt to the next
+const REFRESH_MS = 1000; // from one attempt to the next
 const REQUEST_MS = 60000; // after which a request is given up, so that none piles up
 const KEPT = 'dva-sim-unconfirmed-stops';
 const REFUSED = 'refused'; // outcome of what asking again does not change
@@ -65,7 +65,7 @@ export async function stopRobots(which) {
   for (let attempt = 1; open.get(key) === stop; attempt += 1) {
     const pause = new Promise((go) => {
       stop.again = () => go(undefined);
-      window.setTimeout(go, AGAIN_MS);
+      window.setTimeout(go, REFRESH_MS);
     });
     asked.push(overSocket(id, which), overRequest(id, which));
     const done = await firstAnswer(asked, pause);

@@ -8,7 +8,7 @@ import { keepAsking } from './round_trip.js';
 import { isDriveSocket, replaceDriveSocket } from './wire.js';
 
 const FIRST_WAIT_MS = 250;
-const LONGEST_WAIT_MS = 4000;
+const MAX_WAIT_MS = 4000;
 const RESYNC_EVERY_MS = 1000;
 const LEAVING = 1001; // the server ends
 const REFUSED = 1008; // what this page sends is refused
@@ -52,7 +52,7 @@ export function connect() {
     else if (isAlive()) connection.value = 'lost';
     notice.value = refusalOf(why) || notice.value;
     window.setTimeout(connect, wait);
-    wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
+    wait = Math.min(MAX_WAIT_MS, 2 * wait);
   };
   const look = window.setInterval(() => {
     unheard += 1;
@@ -149,7 +149,7 @@ function open(key) {
     const unexpected = isDriveSocket(socket);
     if (unexpected) reaches.value = false;
     socketLost(unexpected, refusal || 'The connection was lost before the reply arrived.');
-    if (unexpected) window.setTimeout(() => reopen(socket, key), LONGEST_WAIT_MS / 4);
+    if (unexpected) window.setTimeout(() => reopen(socket, key), MAX_WAIT_MS / 4);
   };
   return socket;
 }

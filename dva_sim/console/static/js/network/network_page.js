@@ -10,8 +10,8 @@ import { MarkMoment } from './mark_moment.js';
 import { PatternSelect } from './pattern_select.js';
 import { KINDS, SPAN_S, read } from './samples.js';
 
-const MOST_LINES = 4;
-const MOST_ROWS = 50;
+const MAX_LINES = 4;
+const MAX_ROWS = 50;
 const DASHES = [undefined, [6, 3], [2, 3], [10, 3, 2, 3]];
 
 /** @typedef {import('../lines.js').Thing} Thing */
@@ -43,9 +43,9 @@ function Figures() {
     <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways"><table><thead><tr>
       ${heads.map((head, n) => html`<th scope="col">${head}${units[n] && html`<small> ${units[n]}</small>`}</th>`)}
     </tr></thead><tbody class="reported">
-      ${list.slice(0, MOST_ROWS).map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}
+      ${list.slice(0, MAX_ROWS).map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}
     </tbody></table></div>
-    ${list.length > MOST_ROWS && html`<p class="soft">and ${list.length - MOST_ROWS} more robots</p>`}
+    ${list.length > MAX_ROWS && html`<p class="soft">and ${list.length - MAX_ROWS} more robots</p>`}
   </section>`;
 }
 
@@ -66,7 +66,7 @@ function Row({ robot }) {
 }
 
 function Charts() {
-  const shown = inOrder().slice(0, MOST_LINES);
+  const shown = inOrder().slice(0, MAX_LINES);
   const numbers = shown.map((robot) => robot.i);
   void rows.value;
   const lines = shown.map((robot, n) => ({

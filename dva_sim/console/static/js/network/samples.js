@@ -5,7 +5,7 @@ import { History } from '../charts/history.js';
 
 export const SPAN_S = 60;
 const EVERY_MS = 500;
-const MOST_ROBOTS = 50;
+const MAX_ROBOTS = 50;
 
 /** @typedef {{title: string, unit: string, least: number, read: (i: number) => number | null}} Kind */
 
@@ -28,7 +28,7 @@ export function keepSampling() {
 }
 
 function sample() {
-  const now = robots.peek().slice(0, MOST_ROBOTS).map((robot) => robot.i);
+  const now = robots.peek().slice(0, MAX_ROBOTS).map((robot) => robot.i);
   if (!now.length || isStale.peek()) return;
   if (now.join() !== known.join()) {
     known = now;

@@ -6,9 +6,9 @@ import { thumb, tilts } from './drive.js';
 import { screen } from './screens.js';
 import { listen, onSample } from './sensor.js';
 
-const LEAST_MS = 12; // between two batches: of 60 samples a second none waits for another
+const MIN_MS = 12; // between two batches: of 60 samples a second none waits for another
 const MOST = 64; // samples in one
-const MOST_BACKLOG = 4096; // [B] beyond it the connection does not keep up: the oldest are lost
+const MAX_BACKLOG = 4096; // [B] beyond it the connection does not keep up: the oldest are lost
 const NEEDED_ON = ['calibration', 'teleoperation'];
 
 /** @type {import('./sensor.js').Sample[]} */
@@ -30,7 +30,7 @@ export function keepSampling() {
 
 /** Send now, or once the minimum interval has passed; a periodic timer would delay samples. */
 function sendSoon() {
-  const wait = LEAST_MS - (performance.now() - sent);
+  const wait = MIN_MS - (performance.now() - sent);
   if (wait <= 0) send();
   else if (!timer) timer = window.setTimeout(send, wait);
 }
@@ -53,7 +53,7 @@ function lose() {
 function send() {
   window.clearTimeout(timer);
   timer = 0;
-  if (!waiting.length || backlog() > MOST_BACKLOG) return;
+  if (!waiting.length || backlog() > MAX_BACKLOG) return;
   const batch = waiting;
   const message = {
     do: 'samples',

@@ -1,6 +1,6 @@
 /** Server bar: state and address of the DVA's server, and buttons to start and stop it. */
 import { html, useState } from '../../vendor/preact.js';
-import { MOST_PORT } from '../declared.js';
+import { MAX_PORT } from '../declared.js';
 import { maySteer, rows } from '../store.js';
 import { act } from '../net/actions.js';
 import { Field, wrongNumber } from '../ui/fields.js';
@@ -14,7 +14,7 @@ export function ServerBar() {
   const { listens, modelled } = server;
   const answers = listens && (server.hearing ?? 'answers') === 'answers';
   const shown = port ?? String(server.port ?? '');
-  const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST_PORT, '');
+  const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MAX_PORT, '');
   const start = () => act('server_start', { port: Number(shown) });
   return html`<section class="panel server" aria-label="Server">
     <p role="status" aria-label="Server state" class=${answers ? 'state reported' : 'state stopped reported'}>

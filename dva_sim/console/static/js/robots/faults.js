@@ -1,6 +1,6 @@
 /** Switches that inject faults into a robot; switching a fault off undoes it. */
 import { html, useState } from '../../vendor/preact.js';
-import { MOST_PROCESSING_S } from '../declared.js';
+import { MAX_PROCESSING_S } from '../declared.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
 import { useRequested } from '../ui/requested.js';
@@ -42,7 +42,7 @@ function Knob({ name, hint, on, ask }) {
 /** @param {{robot: Thing}} props */
 function Processing({ robot }) {
   const reported = windowOf(robot.i)?.faults.processing_s ?? null;
-  const [own, set] = useState(MOST_PROCESSING_S);
+  const [own, set] = useState(MAX_PROCESSING_S);
   const ask = (/** @type {boolean} */ on, seconds = own) =>
     act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
   const [isSlow, slow] = useRequested(reported !== null, (on) => ask(on));
@@ -53,7 +53,7 @@ function Processing({ robot }) {
   return html`<div class="processing">
     <label class="tick" title="Its computer needs this long for each message."><input type="checkbox" checked=${isSlow}
       disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
-    <${Slider} name="Processing time" min=${0} max=${MOST_PROCESSING_S} step=${0.1} value=${reported ?? own}
+    <${Slider} name="Processing time" min=${0} max=${MAX_PROCESSING_S} step=${0.1} value=${reported ?? own}
       disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />
   </div>`;
 }

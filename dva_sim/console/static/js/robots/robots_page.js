@@ -10,7 +10,7 @@ import { ModeMark } from '../ui/icon.js';
 import { percentText, plain } from '../ui/words.js';
 import { RobotPage } from './robot_page.js';
 
-const MOST_PICTURES = 6; // of more, a page and its renderer have too much to draw
+const MAX_PICTURES = 6; // of more, a page and its renderer have too much to draw
 
 /** The page. */
 export function RobotsPage() {
@@ -32,7 +32,7 @@ function Nobody({ name }) {
 
 function List() {
   const key = robots.value.map((robot) => robot.i).join();
-  const areSeen = !isPast.value && robots.value.length <= MOST_PICTURES;
+  const areSeen = !isPast.value && robots.value.length <= MAX_PICTURES;
   useEffect(() => {
     if (areSeen) watch(robots.peek().map((robot) => robot.i));
     return () => watch([]);

@@ -3,7 +3,7 @@ import { html } from '../../vendor/preact.js';
 import { isModelCar } from './side_view.js';
 import { degrees, fixed, side, windowOf } from './window.js';
 
-const MOST_DEG = 30;
+const MAX_DEG = 30;
 const CAR_DEG = 25; // how far a model car's wheels go, whatever is asked for
 
 /** @typedef {import('../lines.js').Thing} Thing */
@@ -13,7 +13,7 @@ export function TopView({ robot }) {
   const rate = windowOf(robot.i)?.turn_rate_radps ?? 0;
   const way = side(rate);
   const car = isModelCar(robot);
-  const asked = Math.max(-MOST_DEG, Math.min(MOST_DEG, degrees(rate)));
+  const asked = Math.max(-MAX_DEG, Math.min(MAX_DEG, degrees(rate)));
   const angle = car ? CAR_DEG * Math.sign(Number(rate.toFixed(3))) : asked;
   const text = car ? `steering ${way}` : `turn rate ${fixed(degrees(rate), 0)} °/s, ${way}`;
   return html`<section class="panel view-panel reported" aria-label="Top view"><h2>Top view</h2>

@@ -6,7 +6,7 @@ const PAGES = [
   ...['map', 'main', 'devices', 'robots', 'drive', 'events', 'network', 'audit'],
   ...['story', 'recordings'],
 ];
-const MOST_AT_ONCE = 2;
+const MAX_AT_ONCE = 2;
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => {
   hash.value = location.hash;
@@ -45,7 +45,7 @@ export const driven = computed(() => {
   const wanted = (parts.value.query.get('robots') ?? '').split(',');
   const found = wanted.flatMap((label) => robots.value.filter((robot) => robot.label === label));
   const some = found.length ? found : robots.value.slice(0, 1);
-  return some.slice(0, MOST_AT_ONCE);
+  return some.slice(0, MAX_AT_ONCE);
 });
 
 /** @param {string} name */
@@ -56,6 +56,6 @@ export const addressOf = (name) => {
 
 /** @param {string[]} labels */
 export function chooseRobots(labels) {
-  const unique = [...new Set(labels.filter(Boolean))].slice(0, MOST_AT_ONCE);
+  const unique = [...new Set(labels.filter(Boolean))].slice(0, MAX_AT_ONCE);
   location.hash = `#/drive?robots=${unique.map(encodeURIComponent).join(',')}`;
 }
