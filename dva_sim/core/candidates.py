@@ -62,7 +62,8 @@ def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate])
         return "the policy lets it wait" if free else "nobody can go"
     if advised.device in (event.responder, event.actor):
         return "was sent there by the policy"
-    sooner = [c for c in free if (c.arrival_in or 0.0) < advised.arrival_in - 0.05]
+    # Less is not told apart in whole seconds.
+    sooner = [c for c in free if (c.arrival_in or 0.0) < advised.arrival_in - 0.5]
     if not sooner:
         return f"the first there among {len(free)} who could go"
     best = sooner[0]

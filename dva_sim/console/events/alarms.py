@@ -269,7 +269,9 @@ def _row(alarms: Sequence[RaisedAlarm], now: float) -> AlarmRow:
     first = min(alarms, key=lambda alarm: _rank([alarm]))
     condition = first.condition
     count = len(alarms)
-    many = f"{count} x {condition.kind}" + (f", {condition.place}" if condition.place else "")
+    whose = (alarm.condition.key.partition(" ")[2] for alarm in alarms)
+    where = condition.place or ", ".join(filter(None, whose))
+    many = f"{count} x {condition.kind}" + (f", {where}" if where else "")
     until = first.shelved_until
     return {
         "key": condition.key if count == 1 else _group(condition),

@@ -173,6 +173,16 @@ def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold():
     assert alarms.is_flood
 
 
+def test_robots_that_are_folded_in_a_flood_are_named():
+    alarms = Alarms()
+    lost = [
+        AlarmCondition(f"lost {name}", "robot lost", "high", place="", text=f"{name} is lost")
+        for name in ("robot-1", "robot-2")
+    ]
+    alarms.update([*lost, *map(fire, range(10))], 0.0)
+    assert "2 x robot lost, robot-1, robot-2" in texts(alarms)
+
+
 def test_a_folded_row_stands_for_all_its_alarms_and_is_as_grave_as_the_gravest():
     alarms = Alarms()
     many = [fire(number, "low") for number in range(9)]
