@@ -107,7 +107,7 @@ def readable(file: Path, to: Path | None = None) -> Iterator[Path]:
         yield file
         return
     if to is not None:
-        check_target(to, way="give another name")
+        check_target(to, remedy="give another name")
         record(file, to)
         yield to
         return

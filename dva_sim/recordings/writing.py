@@ -112,13 +112,13 @@ CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 Tables = Mapping[str, Any]
 
 
-def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
+def check_target(path: Path, overwrite: bool = False, **remedy: str) -> None:
     """Tell what keeps a recording from being made there, before anything is run.
 
     Args:
         path: Path of the recording.
         overwrite: True to replace an existing file.
-        way: See `refuse_to_replace`.
+        remedy: See `refuse_to_replace`.
 
     Raises:
         ConfigError: its name does not say what it is, something is there, or nothing can be
@@ -130,7 +130,7 @@ def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
         raise ConfigError(f"folder {str(path.parent)!r} for the recording does not exist")
     if path.is_dir():
         raise ConfigError("is a folder; give the name of a file", path)
-    refuse_to_replace([path], overwrite, **way)
+    refuse_to_replace([path], overwrite, **remedy)
     try_to_write(path.parent)
 
 
