@@ -138,7 +138,7 @@ class ConsoleSupervisor:
             outlet = PipeEnd(inlets.inlet())
             world.recorder.kept = recorder = LiveRecorder(world.clock, outlet)
             recorder.is_own = world.is_ours
-            keep_run(world.run, recorder)
+            keep_facts = keep_run(world.run, recorder)
         try:
             with auditing(options.audit, world.clock, self._about(world), self._say) as audit:
                 world.keep_audit(audit)
@@ -150,6 +150,7 @@ class ConsoleSupervisor:
                 world.sockets.close()
                 self.packets = world.sockets.packets
             if outlet is not None:
+                keep_facts()
                 world.recorder.tidy()
                 outlet.close()
             if viewer is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dva_sim.core.events import EventTable
 from dva_sim.live.recording import LiveRecorder
 from dva_sim.recordings.writing import SENT
@@ -32,8 +34,12 @@ def keep_places(recorder: LiveRecorder, field: Field, now: float) -> None:
     recorder.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
 
 
-def keep_run(run: Run, recorder: LiveRecorder) -> None:
-    """Record all facts of a run in this process, from now on."""
+def keep_run(run: Run, recorder: LiveRecorder) -> Callable[[], None]:
+    """Record all facts of a run in this process, from now on.
+
+    Returns:
+        Function that records what has changed since the last second, for the end of the run.
+    """
     field = run.field
     clock = run.clock
 
@@ -53,3 +59,4 @@ def keep_run(run: Run, recorder: LiveRecorder) -> None:
     clock.every(FILM_PERIOD, lambda: keep_places(recorder, field, clock.now))
     clock.every(WATCH_PERIOD, lambda: log.places(clock.now, field.places()))
     clock.every(1.0, facts)
+    return facts

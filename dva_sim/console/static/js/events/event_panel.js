@@ -70,7 +70,7 @@ function Decisions({ event }) {
     setResult(done.ok ? done.text : '');
     if (!done.ok) return;
     reason.value = '';
-    seeDecided(event);
+    seeDecided(event.number);
   };
   const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more) =>
     tell(await act(what, more));
@@ -138,7 +138,7 @@ function NextStep({ event, tell }) {
         ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom, sent[0])}`}</button>`}
       ${!whom && !sent.length && html`<p class="none">Nobody can go.</p>`}
       ${isUnseen(event) && html`<button type="button" key="acknowledge" class=${looks || isNext ? '' : 'primary'} disabled=${off}
-        onClick=${async () => tell(await acknowledge(event))}>Acknowledge</button>`}
+        onClick=${() => acknowledge(event)}>Acknowledge</button>`}
     </div></div>`;
 }
 

@@ -57,8 +57,11 @@ export const acknowledge = (event) => (event.acknowledged
   ? act('alarm_acknowledge', { alarm: `event ${event.number}` })
   : act('event_acknowledge', { event: event.number }));
 
-/** Note that the person who has decided on an event has seen it. @param {SiteEvent} event */
-export const seeDecided = (event) => isUnseen(event) && ask('alarm_acknowledge', { alarm: `event ${event.number}` });
+/** Note that the person who has decided on an event has seen it. @param {number} number */
+export function seeDecided(number) {
+  const event = events.peek().find((each) => each.number === number);
+  if (event && isUnseen(event)) ask('alarm_acknowledge', { alarm: `event ${number}` });
+}
 
 /** Shelf of an event's alarm; undefined if it is on none. @param {SiteEvent} event */
 export const shelfOf = (event) => alarmList.value.shelved.find((alarm) => alarm.event === event.number);

@@ -45,7 +45,7 @@ export const TEXTS = [
   {
     title: 'Events',
     lines: [
-      'Left: what is open, the worst first; a red edge means that nobody has acknowledged it, or not since it became graver. Severity is the worst that has been known; it never falls. Middle: its place, and the picture of the robot that is sent or could go. Right: what you can do.',
+      'Left: what is open, the worst first; a red edge means that nobody has acknowledged it as grave as it is; severity never falls. Middle: its place, and what the robot that is sent or could go sees. Right: what you can do.',
       'The blue button sends whom it names: by an order of the DVA, on a mission without a driver, or driven by you.',
       'A robot that you send by itself is yours: say what is there with “Confirm” or “Refute”. “Shift” shows who is there and what happened, and hands over to a colleague.',
       'Alarms sound once you click the loudspeaker in the bar. The title of the page counts what nobody has acknowledged.',

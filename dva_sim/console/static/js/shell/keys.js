@@ -2,12 +2,11 @@
 import { emergencyStop } from '../net/emergency.js';
 import { isPast } from '../store.js';
 import { openHelp } from '../help/help.js';
-import { openWorst } from './calling.js';
 
 const WRITING = 'input:not([type=range]), textarea, select';
 
-/** Start listening for keys. */
-export function listenForKeys() {
+/** Start listening for keys. @param {Record<string, () => void>} deeds by further keys */
+export function listenForKeys(deeds) {
   window.addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && event.shiftKey) {
       event.preventDefault();
@@ -15,7 +14,7 @@ export function listenForKeys() {
     }
     if (isWriting(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === '?') openHelp();
-    if (event.key === 'e') openWorst();
+    deeds[event.key]?.();
   });
 }
 

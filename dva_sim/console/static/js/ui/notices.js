@@ -44,9 +44,9 @@ function DvaSilence() {
   const server = /** @type {any} */ (rows.value?.server);
   if ((server?.hearing ?? 'answers') === 'answers') return null;
   const text = server.own !== false && !server.listens
-    ? "The DVA's server is stopped. What you see is out of date. Start it on the console's page Main."
+    ? "The DVA's server is stopped: start it on the console's page Main. What you see is out of date."
     : server.hearing === 'never'
-      ? `No DVA has answered at ${server.address} since this console was started. Retrying …`
+      ? `No DVA has answered at ${server.address} since the console was started. Retrying …`
       : `The DVA at ${server.address} is silent. What you see is out of date. Retrying …`;
   return html`<p class="warning">${text}</p>`;
 }

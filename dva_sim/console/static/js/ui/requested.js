@@ -2,11 +2,11 @@
 import { useEffect, useState } from '../../vendor/preact.js';
 
 /**
- * State of a switch: the requested one until the simulation reports it or refuses, else the reported one.
+ * The requested value until it is reported or refused, else the reported one.
  * @template Value
  * @param {Value} reported
  * @param {(wanted: Value) => Promise<import('../types.js').Answer>} ask
- * @param {(value: Value) => unknown} [key] what makes two values the same
+ * @param {(value: Value) => unknown} [key]
  * @returns {[Value, (wanted: Value) => void]}
  */
 export function useRequested(reported, ask, key = (value) => value) {
