@@ -156,12 +156,13 @@ def test_what_is_over_stands_below_what_is_open(address, visits):
     base, _, token = address.partition("?token=")
     head = {"Authorization": f"Bearer {token}"}
     report = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
+    rows = page.get_by_role("list", name="Open events and alarms").get_by_role("listitem")
     given = {"event_raise": report, "event_false_alarm": {"event": 1, "reason": "a drill"}}
     for action, arguments in given.items():
         asked = {"id": action, "action": action, "arguments": arguments}
         assert page.request.post(f"{base}api/actions", headers=head, data=asked).json()["ok"]
+        expect(rows).to_have_text([re.compile("Flood")])  # before it is over, and then
     raised(page, severity="low")
-    rows = page.get_by_role("list", name="Open events and alarms").get_by_role("listitem")
     expect(rows).to_have_text([re.compile("Fire, Kitchen"), re.compile("Flood.*over, not ackn")])
 
 
