@@ -56,7 +56,7 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
     ("file", "right", "wrong"),
     [
         ("codec.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
-        ("schema.py", 'len(found) != rest.count(b"<")', "False"),
+        ("schema.py", 'len(tags) != rest.count(b"<")', "False"),
         ("elements.py", "destination, number, source,", "source, number, destination,"),
     ],
     ids=["bound", "markup", "fields"],
