@@ -19,7 +19,7 @@ LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
 SILENCE = 3.0  # of who draws, after which there is no picture [s]
 STARTING = 60.0  # before the first word, which comes when the site is built [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
-FRESH_FOR_S = 1.0  # a single picture that came so long ago is not waited for [s]
+FRESH_FOR_S = 1.0  # a picture younger than this is returned without waiting [s]
 MAX_VIEWERS = 64
 
 

@@ -48,7 +48,7 @@ TASK_COLUMNS: Final = (
 )
 UNIT_COLUMNS: Final = ("free", "robot", "engaged")  # may be sent; is a robot; is under way
 MINUTE: Final = 60.0
-NO_END: Final = -1.0  # stands for a way or time that has no end
+NO_END: Final = -1.0  # stands for an infinite distance or time
 BOUND: Final = 1e7  # bound of all observations
 
 

@@ -9,7 +9,7 @@ from dva_sim.core.registry import MAX_DEVICES
 from dva_sim.kernel.errors import DvaSimError
 
 PER_DEVICE: Final = 16  # at the DVA
-OWN_FILES: Final = 200  # for all else
+OWN_FILES: Final = 200  # files of the program itself
 
 
 class DeviceRoom(NamedTuple):

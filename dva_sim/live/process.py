@@ -33,7 +33,7 @@ from dva_sim.simulation.full.verdicts import Verdict
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
-DVA_WAIT_S = 30.0  # of a part that is alone, with a DVA that does not answer [s]
+DVA_WAIT_S = 30.0  # longest wait of a lone part for a DVA that does not answer [s]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-MAX_UNANSWERED = 64  # unanswered at all; a second each way needs 20 at ten commands a second
+MAX_UNANSWERED = 64  # unanswered requests; a second each way needs 20 at ten commands a second
 _FIRST = 4
 _QUEUE = 0.5  # requests; more than that in a queue is a queue
 _ROUND_TRIP_S = 30.0  # the least one of so long: a path may become longer

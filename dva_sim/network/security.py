@@ -187,7 +187,7 @@ def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
 # but not while somebody listens and hangs up, so the first one is what limits that storm.
 RECONNECT_FIRST = 250  # [ms]
 RECONNECT_MAX = 4_000  # [ms]
-MAX_HANGUPS = 3  # times that a peer may hang up in the handshake before it is told
+MAX_HANGUPS = 3  # interrupted handshakes of a peer before they are reported
 UNKNOWN_KEYS_REPORTED = 100  # unknown keys that are told one by one; there can be any number
 EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
 

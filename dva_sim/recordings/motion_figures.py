@@ -13,7 +13,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.motion import MotionSample, PhoneMotion
 
 GAP: Final = 3.0  # median intervals: a longer one is a gap
-REST_S: Final = 2.0  # the quietest stretch of so long counts as rest [s]
+REST_S: Final = 2.0  # length of the quietest stretch, which counts as rest [s]
 MIN_SAMPLES: Final = 30  # samples
 MIN_STEP_S: Final = 1e-6  # between two of them: those nearer are of one moment
 

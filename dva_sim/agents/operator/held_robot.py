@@ -26,9 +26,9 @@ from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
 STILL_WANTED = 0.3  # design: what was wanted no longer ago holds when a drive begins [s]
-MAX_INPUTS = 4096  # design: that are remembered until they act
+MAX_INPUTS = 4096  # design: inputs remembered until they take effect
 GRANT_WITHIN = 5.0  # design: the DVA's grant may be on its way to the robot for so long [s]
-MAX_PICTURES = 1024  # design: whose ticks are remembered until they are drawn
+MAX_PICTURES = 1024  # design: pictures whose ticks are remembered until they are drawn
 LOST_AFTER = 9.0  # design: without a word of the robot: three times its watchdog [s]
 STALE_STATUSES = 3  # design: status messages in a row, which may be older than the start of a drive
 

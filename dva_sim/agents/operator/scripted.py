@@ -183,7 +183,7 @@ COMMANDS_AGAIN = 10  # design: of the second drive
 GIVE_BACK_AGAIN = 2.0  # design: while the DVA cannot keep that [s]
 STANDSTILL = 2.0  # design: after it a robot certainly stands [s]
 TRIES = 20  # design: to start
-RETRY_DELAY_S = 0.5  # design: before asking once more for what is not there yet [s]
+RETRY_DELAY_S = 0.5  # design: pause before a request for something missing is repeated [s]
 
 
 def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str, int]]:

@@ -204,7 +204,7 @@ class BystanderAgent(OnFoot):
 
 
 ELBOW_ROOM: Final = 0.3  # design: radius that must fit where somebody works [m]
-START_GAP_M: Final = 0.8  # design: nobody begins nearer to somebody else [m]
+START_GAP_M: Final = 0.8  # design: minimum distance between people at the start [m]
 PASSAGE: Final = 3.5  # design: a room so many times as long as wide is a corridor
 TRIES: Final = 100  # design: to find a place
 

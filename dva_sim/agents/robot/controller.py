@@ -19,7 +19,7 @@ from dva_sim.protocol import messages as m
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
 ENDS = "done", "failed"  # how a mission ends
 MAX_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
-INQUIRY_WAIT_S = 3.0  # so long an order waits for what the DVA says of its sender, or longer [s]
+INQUIRY_WAIT_S = 3.0  # minimum time for which an order waits for the DVA's word on its sender [s]
 
 
 class Mode(StrEnum):

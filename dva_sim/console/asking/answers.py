@@ -11,7 +11,7 @@ from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.seats import REFUSAL, Answered, DoneLine
 from dva_sim.kernel.errors import DvaSimError
 
-SAME_STOP_S: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
+SAME_STOP_S: Final = 1.0  # two requests for an emergency stop within this time count as one [s]
 
 FAREWELL_PREFIX: Final = (
     "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so

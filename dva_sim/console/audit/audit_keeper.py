@@ -30,7 +30,7 @@ from dva_sim.recordings.audit_log import (
     AuditWriteError,
 )
 
-RETRY_DELAY_S: Final = 1.0  # after so long a full disk is tried again [s]
+RETRY_DELAY_S: Final = 1.0  # pause before writing to a full disk is tried again [s]
 MAX_AT_ONCE: Final = 500  # rows of a transaction
 MAX_WAITING: Final = 10_000  # rows that wait for a disk; more are counted, and told of in a row
 SYSTEM: Final = "console"  # author of the rows that no person is behind

@@ -22,7 +22,7 @@ from dva_sim.console.wire.seats import REFUSAL, Answered
 from dva_sim.network.realtime import PacedClock
 from dva_sim.protocol import messages as m
 
-RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
+RECORD_WITHIN: Final = 0.5  # longest wait for the DVA's record after its answer [s]
 
 
 class DecidingSystem(Protocol):

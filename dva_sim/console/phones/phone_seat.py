@@ -24,7 +24,7 @@ from dva_sim.recordings.motion import MotionApp, MotionSample, MotionWriter
 USUAL_HZ = 60.0  # of a phone's browser, until its own rate is known
 RATED_BY = 64  # samples, by which the rate is told
 MIN_RATED = 8
-FRESH_FOR_S = 1.0  # a rate is told for so long after the newest sample [s]
+FRESH_FOR_S = 1.0  # the sample rate is shown until the newest sample is this old [s]
 MAX_GAP = 10**6  # of what is counted as lost at once
 
 

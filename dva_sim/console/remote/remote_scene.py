@@ -11,7 +11,7 @@ from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
 LINK: Final[LinkShown] = {"kind": "attached", "processing_s": None}
-DEFAULT_REACH_M: Final = 40.0  # of the first position, where no site is known [m]
+DEFAULT_REACH_M: Final = 40.0  # half-width of a map without a site [m]
 
 
 def remote_scene(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 LIMIT = 0.25  # behind real time; above, nobody drives by what is on the page [s]
-RECOVERY_S = 1.0  # below the limit for so long, driving may begin again [s]
+RECOVERY_S = 1.0  # driving may begin again once the lag has been below the limit for this time [s]
 
 
 class LagRule:

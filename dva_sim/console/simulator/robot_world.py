@@ -44,7 +44,7 @@ from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.simulation.scenario import Scenario
 
 POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
-LOOK_PERIOD_S = 0.05  # from one look at what has changed to the next, real time [s]
+LOOK_PERIOD_S = 0.05  # period of looks at what has changed, in real time [s]
 PAGES = ["robots", "map", "audit"]
 LINK: Final[LinkShown] = {"kind": "real", "processing_s": 0.0}
 

@@ -41,7 +41,7 @@ MAX_MS: Final = 10**13  # of a clock [ms]
 STEPS: Final = (0.001, 100.0)  # of a phone's calibration [m/s^2]
 DELAYS: Final = (0.02, 5.0)  # of a phone, at most [s]
 MAX_LEG: Final = 3600.0  # of the tour [s]
-MAX_COORDINATE_M: Final = 1e6  # of the origin: no site is so large [m]
+MAX_COORDINATE_M: Final = 1e6  # distance from the origin; no site is this large [m]
 SENSOR_RATES: Final = (0.02, 20.0)  # of the values of a robot [Hz]
 SHIFT: Final = 8 * 3600  # no alarm is shelved for longer [s]
 

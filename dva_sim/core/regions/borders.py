@@ -17,7 +17,7 @@ from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import DETECTOR, GUARD, PEER, ROBOT
 
-CROSSED_AFTER_M: Final = 2.0  # design: so far inside another region one has crossed the border [m]
+CROSSED_AFTER_M: Final = 2.0  # design: depth beyond a border at which it is crossed [m]
 FOR: Final = 10.0  # design: and for so long: who walks along it stays where he was [s]
 ASK_AGAIN: Final = 10.0  # design: pause after a hand-over that was not taken [s]
 BACK: Final = 60.0  # design: pause after a guard was sent back, and is not there [s]

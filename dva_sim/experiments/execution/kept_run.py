@@ -44,7 +44,7 @@ from dva_sim.simulation.scenario import Scenario
 Missing = dict[str, str]  # reasons, by table
 
 KEPT_RUN: Final = "console.sqlite"  # the journal
-RETRY_DELAY_S: Final = 1.0  # after so long a full disk is tried again [s]
+RETRY_DELAY_S: Final = 1.0  # pause before writing to a full disk is tried again [s]
 _FORMAT: Final = 1
 _TABLES: Final = episodes.TABLES | {
     "drives": drive_rows,

@@ -107,7 +107,7 @@ OF_BANDS: Final[dict[int, Coverage]] = {
 """Coverage of a band over six independent levels, by number of persons."""
 OF_STOPPING: Final[Coverage] = (0.932, 0.893)
 """Coverage of an interval that ends a study by its width, with looks every 12 persons to 240."""
-WELL_COVERED_PERSONS: Final = 24  # persons, from which on the loss of a band is not mentioned
+WELL_COVERED_PERSONS: Final = 24  # with as many persons, a band loses no coverage worth a remark
 
 
 def coverage_remarks(study: Study) -> Iterator[str]:

@@ -25,7 +25,7 @@ from dva_sim.serving.processes import Child, end_all
 
 PORT = 7000  # at which each relay takes connections across the link
 ENDS = {NEAR: FAR, FAR: NEAR}
-_RETRY_DELAY_S = 0.05  # between tries to reach the relay at the other end [s]
+_RETRY_DELAY_S = 0.05  # pause between attempts to reach the relay at the other end [s]
 _BUFFER = 4096  # of a relay, each way [B]
 _LONGEST = 90  # of the folder's name: Linux takes 107 characters for the name of a socket
 _BACKLOG = 128  # connections that a relay has not taken yet

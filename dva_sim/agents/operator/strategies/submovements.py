@@ -35,7 +35,7 @@ from collections.abc import Iterator
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed
 from dva_sim.agents.population import Person
 
-USUAL_FRAME_S = 1.0 / 60.0  # design: time between two frames before two were seen [s]
+USUAL_FRAME_S = 1.0 / 60.0  # design: assumed time between frames until two have been seen [s]
 FAILS = 0.5  # design: a movement has failed if more than this share of its way is left
 STEEPNESS = 6.0  # design: of the share of movements that are waited for; persons differ as well
 
