@@ -37,7 +37,7 @@ class ConsoleActions:
         alarms = AlarmActions(
             pages.alarms, pages.author, lambda *arguments: dispatcher.do(*arguments)
         )
-        decisions = DecisionActions(pages.driven, pages.rooms, driving)
+        decisions = DecisionActions(pages.driven, pages.rooms, driving, alarms.seeing)
         desk = DeskActions(
             pages.driven,
             pages.rooms,

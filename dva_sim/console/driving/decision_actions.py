@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
+from typing import Any, Final, Protocol
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.asking.dispatcher import does
@@ -38,6 +38,7 @@ from dva_sim.console.wire.arguments import (
 from dva_sim.protocol import messages as m
 
 Decide = Callable[[ControlRoomAgent, OnResult], object]
+DECIDING: Final = (m.Assign, m.TakeOff, m.FalseAlarm, m.Escalate, m.AddNote)  # see their event
 
 
 class DecidingRooms(Protocol):
@@ -72,15 +73,24 @@ class DecisionActions:
         system: System whose events and robots those are.
         rooms: Control rooms of the console.
         driving: Seats, and drives from pages.
+        seeing: Function that makes of a callback one that notes first that the person of a
+            successful decision has seen the alarm of its event.
 
     Attributes:
         sent: Robots that people have sent by themselves.
     """
 
-    def __init__(self, system: DrivenSystem, rooms: DecidingRooms, driving: Driving) -> None:
+    def __init__(
+        self,
+        system: DrivenSystem,
+        rooms: DecidingRooms,
+        driving: Driving,
+        seeing: Callable[[str, Mapping[str, Any], OnResult], OnResult],
+    ) -> None:
         self._system = system
         self._rooms = rooms
         self._driving = driving
+        self._seeing = seeing
         self.sent = SentRobots()
 
     @does("room_join")
@@ -93,6 +103,8 @@ class DecisionActions:
     def decide(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Decide on an event."""
         body, done = decision_of(line, self._device, self._seen)
+        if isinstance(body, DECIDING):
+            on_result = self._seeing(client, line, on_result)
         self._rooms.decide(client, _role(line), on_result, partial(self._ask, body, done))
 
     @does("event_raise")
@@ -147,12 +159,14 @@ class DecisionActions:
             mission = self.sent.send(client, agent, robot, status)
             mission.begin(line.get("reason") or None, seen_decisions, on_result)
 
+        on_result = self._seeing(client, line, on_result)
         self._rooms.decide(client, _role(line), on_result, send)
 
     @does("mission_found")
     def _found(self, client: str, line: FindingAsked, on_result: OnResult) -> None:
         """Report what a person sees through the robot that went by itself."""
-        self.sent.mission(client, line["event"]).found(line["finding"], on_result)
+        mission = self.sent.mission(client, line["event"])
+        mission.found(line["finding"], self._seeing(client, line, on_result))
 
     @does("revoke")
     def _revoke(self, client: str, line: OfDevice, on_result: OnResult) -> None:
@@ -196,6 +210,7 @@ class DecisionActions:
                 on_result=on_result,
             )
 
+        on_result = self._seeing(client, line, on_result)
         self._rooms.decide(client, _role(line), on_result, begin)
 
 

@@ -155,15 +155,13 @@ def test_what_is_over_stands_below_what_is_open(address, visits):
     page = visits(1440, 900).open(address, "events")
     base, _, token = address.partition("?token=")
     head = {"Authorization": f"Bearer {token}"}
-    report = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
     rows = page.get_by_role("list", name="Open events and alarms").get_by_role("listitem")
-    given = {"event_raise": report, "event_false_alarm": {"event": 1, "reason": "a drill"}}
-    for action, arguments in given.items():
-        asked = {"id": action, "action": action, "arguments": arguments}
-        assert page.request.post(f"{base}api/actions", headers=head, data=asked).json()["ok"]
-        expect(rows).to_have_text([re.compile("Flood")])  # before it is over, and then
+    for action, text in [("emergency", "until released"), ("release_emergency", "over, not ackn")]:
+        request = {"id": action, "action": action, "arguments": {}}
+        assert page.request.post(f"{base}api/actions", headers=head, data=request).json()["ok"]
+        expect(rows).to_have_text([re.compile(f"Emergency stop.*{text}")])
     raised(page, severity="low")
-    expect(rows).to_have_text([re.compile("Fire, Kitchen"), re.compile("Flood.*over, not ackn")])
+    expect(rows).to_have_text([re.compile("Fire, Kitchen"), re.compile("Emergency.*over, not")])
 
 
 def test_what_is_shelved_is_counted_as_open(both):

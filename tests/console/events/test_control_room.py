@@ -258,6 +258,31 @@ def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room):
     assert event(room)["acknowledged"]["label"] == "ana"
 
 
+ENDS = ["event_false_alarm", "event_escalate"]
+
+
+@pytest.mark.parametrize("what", [*ENDS, "event_assign", "event_note", "mission"])
+def test_who_decides_on_an_event_has_seen_its_alarm(room, what):
+    more = {
+        "event_false_alarm": {"reason": "welding"},
+        "event_assign": {"device": "robot-1"},
+        "event_note": {"text": "smoke"},
+        "mission": {"robot": "robot-1"},
+    }
+    assert [one["state"] for one in alarms(room) if one["event"] == 1] == ["unacknowledged"]
+    done, text = room.do(what, event=1, **more.get(what, {}))
+    assert done, text
+
+    states = [one["state"] for one in alarms(room) if one["key"] == "event 1"]
+    assert states == ([] if what in ENDS else ["acknowledged"])
+    assert (event(room)["acknowledged"] is None) == (what in ENDS)
+
+
+def test_a_decision_that_is_refused_sees_nothing(room):
+    assert not room.do("event_take_off", event=1, device="robot-1")[0]
+    assert [one["state"] for one in alarms(room) if one["event"] == 1] == ["unacknowledged"]
+
+
 def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room):
     (alarm,) = [one for one in alarms(room) if one["event"] == 1]
     assert not room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]  # without a reason

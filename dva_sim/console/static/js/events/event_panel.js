@@ -10,7 +10,7 @@ import { ageText, capital, plain } from '../ui/words.js';
 import { History, Instructions, useDetails } from './details.js';
 import { HandOver } from './handing_over.js';
 import { assignTo, candidateOf, chosen, estimateOf, isPicked, ProposalPanel, waysOf } from './proposal.js';
-import { acknowledge, inHand, isUnseen, ownerOf, ownRoom, reason, seeDecided, shelfOf } from './shared.js';
+import { acknowledge, inHand, isUnseen, ownerOf, ownRoom, reason, shelfOf } from './shared.js';
 import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -68,9 +68,7 @@ function Decisions({ event }) {
   const about = { event: event.number, decisions: event.decisions ?? null };
   const tell = (/** @type {Done} */ done) => {
     setResult(done.ok ? done.text : '');
-    if (!done.ok) return;
-    reason.value = '';
-    seeDecided(event.number);
+    if (done.ok) reason.value = '';
   };
   const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more) =>
     tell(await act(what, more));

@@ -1,7 +1,7 @@
 /** State of the Events page: the list, the event in hand, the person's name, and the reason being typed. */
 import { computed, signal } from '../../vendor/preact.js';
 import { alarmList, control, events, selection, you } from '../store.js';
-import { act, ask } from '../net/actions.js';
+import { act } from '../net/actions.js';
 import { eventsInOrder, isOpen } from '../map/shown.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -56,12 +56,6 @@ const alarmOf = (event) => alarmList.value.alarms.find((alarm) => alarm.event ==
 export const acknowledge = (event) => (event.acknowledged
   ? act('alarm_acknowledge', { alarm: `event ${event.number}` })
   : act('event_acknowledge', { event: event.number }));
-
-/** Note that the person who has decided on an event has seen it. @param {number} number */
-export function seeDecided(number) {
-  const event = events.peek().find((each) => each.number === number);
-  if (event && isUnseen(event)) ask('alarm_acknowledge', { alarm: `event ${number}` });
-}
 
 /** Shelf of an event's alarm; undefined if it is on none. @param {SiteEvent} event */
 export const shelfOf = (event) => alarmList.value.shelved.find((alarm) => alarm.event === event.number);
