@@ -6,6 +6,13 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import groupby
 
+from dva_sim.agents.operator.published import (
+    blind_lines,
+    lines_of,
+    load_history,
+    load_split,
+    load_targets,
+)
 from dva_sim.validation.evidence import (
     SUBJECTS,
     Evidence,
@@ -28,6 +35,10 @@ loss and for middleware a band around the prediction has to hold what was measur
 *Rule* say what all others have to come to; lines that are shown only count nowhere.
 [Validation](validation.md) explains how lines are judged, and what had been seen before.
 `dva-sim validate` prints the same tables."""
+_COMPARED = """\
+Each comparison is one of the persons of its day. Lines are blind in their first comparison at most,
+and only if nothing had been seen of their publication; those counts alone test the persons on
+unseen data. `operators-split.yaml` has the roles, and `operators-history.csv` each value."""
 PICTURE = "explanation/evidence.svg"
 _PICTURE = "![Measured beside predicted, with a panel for each subject](evidence.svg)"
 _READING = f"""\
@@ -48,6 +59,8 @@ def page() -> str:
     blocks += [_HEAD, _PICTURE, _READING]
     for subject, lines in subjects.items():
         blocks += _subject(TITLES[subject], lines)
+        if subject == "operators":
+            blocks += _comparisons()
     return page_of("Evidence", *blocks)
 
 
@@ -61,6 +74,28 @@ def kept() -> dict[Subject, list[Evidence]]:
     """Return the kept lines of each subject."""
     lines = read_evidence(KEPT)
     return {subject: [e for e in lines if e.subject == subject] for subject in SUBJECTS}
+
+
+def _comparisons() -> Iterator[str]:
+    """Yield what earlier comparisons of the operators were, and how many lines held in each."""
+    split = load_split()
+    history = load_history()
+    lines = lines_of(load_targets(), split)
+    blind = blind_lines(lines, split, history)
+    rows = []
+    for name, comparison in split.comparisons.items():
+        verdicts = [
+            line.holds(history[line.id][name])
+            for line in lines
+            if line.kind == "not-fitted" and name in history.get(line.id, ())
+        ]
+        held, count = blind.get(name, (0, 0))
+        unseen = f"{held} of {count}" if count else "none"
+        day = comparison.day.isoformat()
+        rows.append((name, day, comparison.seen, f"{sum(verdicts)} of {len(verdicts)}", unseen))
+    yield "### Operators: comparisons so far"
+    yield _COMPARED
+    yield table(("comparison", "day", "seen before it", "not fitted to, held", "blind, held"), rows)
 
 
 def _subject(title: str, lines: Sequence[Evidence]) -> Iterator[str]:

@@ -197,7 +197,7 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
         "length": _length(quick),
     }
     return operators_evidence.evidence(
-        lines, simulated, split.rule, played=played, conditions=conditions
+        lines, simulated, split, played=played, conditions=conditions
     )
 
 

@@ -63,8 +63,8 @@ def targets(tag="V", **line):
 
 
 def split_of(**groups):
-    rest = {"exact": {}, "fit": {}, "held_out": {}, "memory": {}}
-    rule = {"exact": 1.0, "held_out": 0.8}
+    rest = {"exact": {}, "fit": {}, "not_fitted": {}, "memory": {}}
+    rule = {"exact": 1.0, "not_fitted": 0.8}
     return checked(SplitFile, {"rule": rule, "strategy": "pursuit", **rest, **groups})
 
 
@@ -107,9 +107,12 @@ MISTAKES = [
     ),
     *mistakes(
         call,
-        (lambda: split_of(fit={"a": ("T",)}, held_out={"b": ("T",)}).kinds(), "'T'"),
+        (lambda: split_of(fit={"a": ("T",)}, not_fitted={"b": ("T",)}).kinds(), "'T'"),
         (lambda: lines_of(targets(low=1), split_of()), "T"),
-        (lambda: lines_of(targets("V,M", low=1), split_of(held_out={"a": ("T",)})), "T held-out"),
+        (
+            lambda: lines_of(targets("V,M", low=1), split_of(not_fitted={"a": ("T",)})),
+            "T not-fitted",
+        ),
         (lambda: targets("X", low=1), "'X' T V, M"),
         (lambda: targets(), "lines.one"),
         (lambda: targets(above=1), "lines.one"),

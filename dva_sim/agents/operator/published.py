@@ -1,4 +1,4 @@
-"""Published data that operators are compared with, and the split into fitted and held out.
+"""Published data that operators are compared with, and the role of each publication.
 
 Which delays these data cover is said here as well: beyond them, what simulated operators do is
 an extrapolation.
@@ -6,8 +6,10 @@ an extrapolation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import date
 from functools import cache
 from typing import Annotated, Literal
 
@@ -21,8 +23,9 @@ from dva_sim.kernel.yaml_files import load_yaml
 FOLDER = "experiments/validation"
 TARGETS = "operators"
 SPLIT = "operators-split"
+HISTORY = "operators-history"
 
-LineKind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
+LineKind = Literal["exact", "fitted", "not-fitted", "remembered", "beside"]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -156,11 +159,25 @@ class RuleConfig(Config):
     """Conditions for passing a validation: shares of the lines that must pass."""
 
     exact: Share
-    held_out: Share
+    not_fitted: Share
+
+
+class ComparisonConfig(Config):
+    """One comparison of the operators of its day with the lines.
+
+    Attributes:
+        day: Day on which it was made.
+        seen: Results that were known before it.
+        blind: Publications of which nothing had been seen before it.
+    """
+
+    day: date
+    seen: str
+    blind: tuple[str, ...] = ()
 
 
 class SplitFile(Config):
-    """Split of the checks: lists of checks by publication.
+    """Roles of the checks: lists of checks by publication; and what was compared when.
 
     Attributes:
         description: Description of the file.
@@ -169,8 +186,9 @@ class SplitFile(Config):
         strategy_why: Reason for that strategy.
         exact: Answers that nobody measured on persons.
         fit: May influence parameters; shown, never counted.
-        held_out: May influence nothing; counted.
+        not_fitted: May influence nothing; counted.
         memory: Nobody has seen their source; shown, never counted.
+        comparisons: Comparisons by name, in their order; a table beside has their values.
     """
 
     description: str = ""
@@ -179,8 +197,9 @@ class SplitFile(Config):
     strategy_why: str = ""
     exact: dict[str, tuple[str, ...]]
     fit: dict[str, tuple[str, ...]]
-    held_out: dict[str, tuple[str, ...]]
+    not_fitted: dict[str, tuple[str, ...]]
     memory: dict[str, tuple[str, ...]]
+    comparisons: dict[str, ComparisonConfig] = Field(default_factory=dict)
 
     def kinds(self) -> dict[str, LineKind]:
         """Return the kind of each check.
@@ -200,7 +219,7 @@ class SplitFile(Config):
         groups: tuple[tuple[LineKind, dict[str, tuple[str, ...]]], ...] = (
             ("exact", self.exact),
             ("fitted", self.fit),
-            ("held-out", self.held_out),
+            ("not-fitted", self.not_fitted),
             ("remembered", self.memory),
         )
         for kind, publications in groups:
@@ -287,10 +306,27 @@ def load_split(name: str = SPLIT) -> SplitFile:
     document = load_yaml(resources.find(name, FOLDER))
     split = validate(SplitFile, document.data, document.error)
     try:
-        split.kinds()
+        check_comparisons(split)
     except ConfigError as error:
         raise document.error(str(error)) from None
     return split
+
+
+def check_comparisons(split: SplitFile) -> None:
+    """Check that each check has one role, and each publication was blind once at most.
+
+    Raises:
+        ConfigError: one has two, or was blind twice, or there is no such publication.
+    """
+    publications = {name for _, name in split.places().values()}
+    seen: set[str] = set()
+    for name, comparison in split.comparisons.items():
+        for publication in comparison.blind:
+            if publication not in publications:
+                raise ConfigError(f"comparison {name!r}: no publication is called {publication!r}")
+            if publication in seen:
+                raise ConfigError(f"publication {publication!r} cannot be blind twice")
+            seen.add(publication)
 
 
 def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
@@ -321,6 +357,44 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
         for check, config in targets.checks.items()
         for name, line in config.lines.items()
     ]
+
+
+def load_history(name: str = HISTORY) -> dict[str, dict[str, float]]:
+    """Return what each comparison gave for each line, by the line's id and the comparison.
+
+    Raises:
+        ConfigError: no such file.
+    """
+    text = resources.find(name, FOLDER, ".csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(text.splitlines())
+    return {
+        row.pop("line"): {name: float(value) for name, value in row.items() if value}
+        for row in rows
+    }
+
+
+def blind_lines(
+    lines: Iterable[TargetLine], split: SplitFile, history: Mapping[str, Mapping[str, float]]
+) -> dict[str, tuple[int, int]]:
+    """Return how many lines held that a comparison saw first, and how many those were.
+
+    Later comparisons of the same lines do not count: by then they had been seen.
+
+    Returns:
+        Lines that held and all lines, by the comparison, of those with any.
+    """
+    counts = {}
+    for name, comparison in split.comparisons.items():
+        verdicts = [
+            line.holds(history[line.id][name])
+            for line in lines
+            if line.publication in comparison.blind
+            and line.has_band
+            and name in history.get(line.id, ())
+        ]
+        if verdicts:
+            counts[name] = sum(verdicts), len(verdicts)
+    return counts
 
 
 def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, LineKind]) -> None:

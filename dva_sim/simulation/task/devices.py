@@ -160,7 +160,8 @@ class Tilt(HandDevice):
         rate = min(config.rate_hz, part.rate_hz)
         super().__init__(config, rate)
         self._limit = math.radians(config.limit_deg)
-        noise = person.motor_noise
+        # Noise is a share of what the hand does, and a tilt that is a place is only held.
+        noise = 0.0 if self.is_place else person.motor_noise
         self._hand = Hand(
             person.hand_lag, streams.fresh("hand"), motor_noise=noise, max_tilt=self._limit
         )
@@ -208,6 +209,7 @@ class TiltPosition(Tilt):
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         super().__init__(config, person, streams, dt)
         self.top = self._gain * MAX_SPEED
+        self._noise = noise_of(person, streams, dt)
         self._rate = 0.0, 0.0
 
     @override
@@ -218,7 +220,7 @@ class TiltPosition(Tilt):
     def move(self, dt: float) -> None:
         limit = self._limit
         x, y = self._aim
-        vx, vy = self._rate
+        vx, vy = shaken(*self._rate, self._noise)
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
 
 

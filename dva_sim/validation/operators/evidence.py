@@ -1,7 +1,7 @@
 """Evidence on operators: a line for each published number, and how they steered.
 
 A line holds if the simulated value lies in the published band; the split says which shares of the
-exact and of the held-out lines must.
+exact lines, and of those that no fit used, must.
 """
 
 from __future__ import annotations
@@ -10,7 +10,14 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from dva_sim.agents.operator.published import LineKind, RuleConfig, TargetLine
+from dva_sim.agents.operator.published import (
+    LineKind,
+    RuleConfig,
+    SplitFile,
+    TargetLine,
+    blind_lines,
+    load_history,
+)
 from dva_sim.validation.evidence import RULE, Evidence, share_rule
 from dva_sim.validation.evidence_page import ResultSheet, ValidationResult
 from dva_sim.validation.operators.experiments import TRIED
@@ -20,14 +27,15 @@ from dva_sim.validation.operators.trials import Cells, Found, certain, mean
 STANDARDS = "standards"  # the exact lines that have nothing to do with operators and phones
 GROUPS: dict[tuple[LineKind, bool], str] = {
     ("exact", False): "Operators and phones: theory, the dissertation's app (exact)",
-    ("held-out", False): "Operators: published experiments that no fit used (held out, not unseen)",
+    ("not-fitted", False): "Operators: published experiments that no fit used (but seen before)",
     ("beside", False): "Operators: beside these, shown, never counted",
     ("fitted", False): "Operators: fitted to, shown, never counted",
     ("remembered", False): "Operators: from memory, shown, never counted",
     ("exact", True): "Fires, alarms and people on foot: standards and textbooks (exact)",
 }
 """Headings, in their order, by kind and by whether the line is one of `STANDARDS`."""
-COUNTED: tuple[LineKind, ...] = ("exact", "held-out")
+LINES_OF: dict[LineKind, str] = {"exact": "exact lines", "not-fitted": "lines not fitted to"}
+COUNTED: tuple[LineKind, ...] = ("exact", "not-fitted")
 STEERING = (
     "In which share of the time the persons of each experiment moved and waited for what they had "
     "done; the rest of it they steered in a closed loop."
@@ -48,7 +56,7 @@ BY = {
 def evidence(
     lines: Sequence[TargetLine],
     simulated: Mapping[str, Found],
-    rule: RuleConfig,
+    split: SplitFile,
     *,
     played: Mapping[str, Cells],
     conditions: Mapping[str, str],
@@ -58,7 +66,7 @@ def evidence(
     Args:
         lines: Published numbers.
         simulated: Simulated numbers by the line's id.
-        rule: Shares that must hold.
+        split: Roles of the publications, and earlier comparisons.
         played: The trials of each experiment.
         conditions: Conditions of the runs, by name.
     """
@@ -66,7 +74,7 @@ def evidence(
     return ValidationResult(
         [
             *sorted(verdicts, key=lambda line: list(GROUPS.values()).index(line.group)),
-            *rule_of(lines, verdicts, rule),
+            *rule_of(lines, verdicts, split.rule, blind_lines(lines, split, load_history())),
         ],
         conditions=conditions,
         sheets=[
@@ -120,19 +128,26 @@ def _judged(line: TargetLine, simulated: Found) -> Evidence:
 
 
 def rule_of(
-    lines: Sequence[TargetLine], verdicts: Sequence[Evidence], rule: RuleConfig
+    lines: Sequence[TargetLine],
+    verdicts: Sequence[Evidence],
+    rule: RuleConfig,
+    blind: Mapping[str, tuple[int, int]],
 ) -> list[Evidence]:
-    """Return the shares that must hold, and how many publications hold in all their lines."""
-    shares = {"exact": rule.exact, "held-out": rule.held_out}
+    """Return the shares that must hold, and those that are shown beside them.
+
+    These are publications that hold in all their lines, and lines that held when nobody had seen
+    them yet (`blind`: as `blind_lines` returns them).
+    """
+    shares: dict[LineKind, float] = {"exact": rule.exact, "not-fitted": rule.not_fitted}
     rows = []
     for kind, least in shares.items():
         own = [v for line, v in zip(lines, verdicts, strict=True) if line.kind == kind]
         if own:
             held = sum(v.verdict == "holds" for v in own)
-            rows.append(share_rule("operators", f"{kind} lines", held, len(own), least=least))
+            rows.append(share_rule("operators", LINES_OF[kind], held, len(own), least=least))
     by_publication: dict[str, list[bool]] = {}
     for line, v in zip(lines, verdicts, strict=True):
-        if line.kind == "held-out":
+        if line.kind == "not-fitted":
             by_publication.setdefault(line.publication, []).append(v.verdict == "holds")
     if by_publication:
         whole = sum(map(all, by_publication.values()))
@@ -140,11 +155,26 @@ def rule_of(
             Evidence(
                 "operators",
                 RULE,
-                "held-out publications",
+                "publications not fitted to",
                 "share that holds in all lines",
                 predicted=whole / len(by_publication),
                 sample=len(by_publication),
                 note=f"{whole} of {len(by_publication)}",
+            )
+        )
+    if blind:
+        held = sum(held for held, _ in blind.values())
+        count = sum(count for _, count in blind.values())
+        each = ", ".join(f"{name} {held} of {count}" for name, (held, count) in blind.items())
+        rows.append(
+            Evidence(
+                "operators",
+                RULE,
+                "blind lines",
+                "share that held in its first comparison, with the persons of that day",
+                predicted=held / count,
+                sample=count,
+                note=f"{held} of {count}: {each}",
             )
         )
     return rows

@@ -1,6 +1,7 @@
-"""Answers that nobody measured on persons: theory, the dissertation's app, standards.
+"""Answers that no task is needed for: theory, the dissertation's app, standards, turnout.
 
-Fires, alarms, walkers, plumes and helpers are asked for the numbers of standards and textbooks.
+Fires, alarms, walkers, plumes and helpers are asked for the numbers of standards, textbooks and
+services.
 """
 
 from __future__ import annotations
@@ -69,17 +70,26 @@ def helpers(seed: int) -> Values:
     assigned, departed, arrived = (
         np.asarray(row[name][came], dtype=float) for name in ("assigned", "departed", "arrived")
     )
-    turnout = departed - assigned
+    setting_out = departed - assigned
     travel = arrived - departed
     stream = np.asarray(names)[row["stream"][came].astype(int)]
-    rng = Streams(seed).fresh("guards")
-    guard = guard_profile()
-    guards = np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
     return {
-        "turnout-fire": _nine_in_ten(guards),
-        "turnout-ems": _nine_in_ten(turnout[stream == "patients"]),
+        "turnout-fire": _nine_in_ten(_guards_turnout(seed)),
+        "turnout-ems": _nine_in_ten(setting_out[stream == "patients"]),
         "travel": _nine_in_ten(travel),
     }
+
+
+def turnout(seed: int) -> Values:
+    """Return the median and the 90th percentile of the turnout of guards [s]."""
+    times = _guards_turnout(seed)
+    return {"median": float(np.median(times)), "ninth": _nine_in_ten(times)}
+
+
+def _guards_turnout(seed: int) -> Floats:
+    rng = Streams(seed).fresh("guards")
+    guard = guard_profile()
+    return np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
 
 
 def alarms() -> Values:
@@ -131,5 +141,7 @@ EXACT: dict[str, Callable[[int], Values]] = {
     "S16c": lambda seed: alarms(),
     "S16d": walkers,
     "S16e": lambda seed: plumes(),
+    "I1": turnout,
+    "I2": turnout,
 }
-"""Simulation of each exact check, given the random seed."""
+"""Simulation of each check that needs no persons at work, given the random seed."""

@@ -302,6 +302,55 @@ def _individuals(cells: Cells) -> Values:
     }
 
 
+# --- targets that stand, under late clicks: an open test bed -----------------------------------
+LATER_S = (0.0, 0.075, 0.15, 0.225)
+
+
+def standing_values(cells: Cells) -> Values:
+    """Return the cost of lag and the time without, geometric means over conditions."""
+    logs = {
+        name: np.mean(
+            [person_means_of(some, log_times) for _, some in trials.by("amplitude_m", "width_m")],
+            axis=0,
+        )
+        for name, trials in cells.items()
+    }
+    prompt, *late = (str(added) for added in LATER_S)
+    ratios = [float(np.exp(np.mean(logs[name] - logs[prompt]))) for name in late]
+    rates = {name: throughput(cells[name]) for name in (prompt, late[-1])}
+    return {
+        **{f"H{n}/ratio": ratio for n, ratio in enumerate(ratios, 1)},
+        "H4/throughput": rates[late[-1]] / rates[prompt],
+        "H5/time": mean(cells[prompt], "movement_time_s"),
+    }
+
+
+# --- driving under seconds of delay: lunar rovers ----------------------------------------------
+ROUND_TRIPS_S = (0, 4, 6, 8)
+
+
+def rover_values(cells: Cells) -> Values:
+    """Return mean speeds relative to that without delay, over the same course."""
+    times = {name: mean(trials, "movement_time_s") for name, trials in cells.items()}
+    return {f"L1/{trip}": times["0"] / times[str(trip)] for trip in ROUND_TRIPS_S[1:]}
+
+
+# --- tilt as a place or as a velocity: Teather & MacKenzie 2014 --------------------------------
+TILT_KINDS: dict[str, dict[str, Any]] = {
+    "position": {},
+    "velocity": {"device.kind": "tilt_velocity", "device.gain": GAINS[PUBLISHED_GAIN]},
+}
+
+
+def tilt_kind_values(cells: Cells) -> Values:
+    """Return the throughput of a tilt that is a place over that of one that is a velocity."""
+    rate = {
+        kind: np.mean([throughput(cells[f"{kind}/{name}"]) for name in SELECTIONS])
+        for kind in TILT_KINDS
+    }
+    return {"T1/ratio": float(rate["position"] / rate["velocity"])}
+
+
 # --- one click that may miss: Claypool, Cockburn & Gutwin 2020 ---------------------------------
 CLICK_S = {"0": 0.05, "0.25": 0.3}
 
@@ -476,6 +525,31 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
     Experiment("frames", "frame-rate", _FRAME_CELLS, frame_values, _ONE),
     Experiment("moving", "moving-target", _moving_cells(), moving_values, _QUICK),
+    Experiment(
+        "standing",
+        "standing-target",
+        {str(added): {"link.up.delay_s": added} for added in LATER_S},
+        standing_values,
+        _ONE,
+    ),
+    Experiment(
+        "rover",
+        "course",
+        {str(trip): _both_ways(trip) for trip in ROUND_TRIPS_S},
+        rover_values,
+        _ONE,
+    ),
+    Experiment(
+        "tilt kinds",
+        "tilt-position",
+        {
+            f"{kind}/{name}": {**changes, "task.selection": selection}
+            for kind, changes in TILT_KINDS.items()
+            for name, selection in SELECTIONS.items()
+        },
+        tilt_kind_values,
+        _TWO,
+    ),
     Experiment(
         "click",
         "one-click",

@@ -4,9 +4,13 @@ import math
 
 import pytest
 
+from dva_sim.kernel import resources
+from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.measures.trials import run_row
 from dva_sim.simulation.task import build, play
 from dva_sim.simulation.task.block import seat_of
+from dva_sim.simulation.task.devices import make_device
 from dva_sim.simulation.task.pointing import Motion, Places
 
 EXACT = {"motor_noise": 1e-9, "perceptual_delay_s": 0.1, "hand_lag_s": 0.02, "margin": 0.5}
@@ -132,3 +136,33 @@ def test_what_a_user_brings_may_fail_and_the_trial_tells_how_often(tmp_path, key
     assert not any(row["completed"] for row in rows)
     assert run_row(rows)["plugin_failures"] == sum(row["plugin_failures"] for row in rows)
     assert play(build(pointing(**TILT), {"trials": 1}), 1)[0]["plugin_failures"] == 0
+
+
+def held(motor_noise):
+    """Readings of a ball's place [rad] after a movement, while the hand holds the device still."""
+    scenario = build(pointing(**TILT), {"operator.traits.motor_noise": motor_noise})
+    device = make_device(scenario.device, seat_of(scenario).person, Streams(1), 0.02)
+    device.aim(0.1, 0.0)
+    for _ in range(50):
+        device.move(0.02)
+        device.reading()
+    device.aim(0.0, 0.0)
+    readings = []
+    for _ in range(250):
+        device.move(0.02)
+        readings.append(device.reading()[0])
+    return readings[100:]
+
+
+def test_a_tilt_that_is_only_held_trembles_no_more_for_a_noisy_movement():
+    offsets = [noisy - calm for noisy, calm in zip(held(0.3), held(1e-9), strict=True)]
+    assert abs(offsets[0]) > 0.01  # where the movement ended
+    assert max(offsets) - min(offsets) < 0.02  # what the accelerometer makes of it
+
+
+def test_a_ball_whose_place_is_the_tilt_comes_to_rest_in_the_smallest_target():
+    document = load_yaml(resources.find("tilt-position", "experiments/scenarios/tasks"))
+    changes = {"task.selection": "dwell", "trials": 5, "task.width_m": 0.0068}
+    rows = play(build(document, changes), 1)
+    assert [row["completed"] for row in rows] == [1.0] * 15
+    assert max(row["movement_time_s"] for row in rows) < 10.0

@@ -28,19 +28,19 @@ def played(strategy, *names):
 
 
 def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
-    """The negative control: of ten held-out lines it misses all eight that a delay is part of."""
+    """The negative control: of ten not fitted lines it misses all eight that a delay is part of."""
     verdicts, found = played("oracle", "lag", "latency", "waiting", "excavator")
     assert found["S7/75"].value == pytest.approx(1.0)
     assert found["S17/increase"].value == pytest.approx(0.0)
-    held_out = {
+    not_fitted = {
         line.id: v.verdict
         for line, v in zip(LINES, verdicts, strict=True)
-        if line.kind == "held-out" and line.check[0] == "S"
+        if line.kind == "not-fitted" and line.check[0] == "S"
     }
     without_delay = {"S11/mean", "S11/variance"}  # the steering law, not played here
-    assert len(held_out) == 10
-    assert {held_out[line] for line in held_out.keys() - without_delay} == {"misses"}
-    assert not passes(rule_of(LINES, verdicts, load_split().rule))
+    assert len(not_fitted) == 10
+    assert {not_fitted[line] for line in not_fitted.keys() - without_delay} == {"misses"}
+    assert not passes(rule_of(LINES, verdicts, load_split().rule, {}))
 
 
 def test_delay_costs_two_persons_time_also_in_the_worst_of_their_intervals():

@@ -36,7 +36,7 @@ def verdict(line, value):
 
 def rule(lines, values):
     """The rule on some lines, by the line's name."""
-    return {line.line: line for line in rule_of(lines, judge(lines, values), RULE)}
+    return {line.line: line for line in rule_of(lines, judge(lines, values), RULE, {})}
 
 
 def trials(person=(0, 1), **columns):
@@ -74,11 +74,11 @@ def test_a_line_beside_the_others_is_shown_without_a_band():
 
 
 def test_a_publication_passes_as_a_whole_if_all_its_lines_do():
-    held_out = [line for line in LINES.values() if line.kind == "held-out"]
-    values = {line.id: middle(line) for line in held_out}
-    assert rule(held_out, values)["held-out publications"].note == "9 of 9"
+    not_fitted = [line for line in LINES.values() if line.kind == "not-fitted"]
+    values = {line.id: middle(line) for line in not_fitted}
+    assert rule(not_fitted, values)["publications not fitted to"].note == "9 of 9"
     values["S8/slope"] = values["S7/75"] = certain(0.0)  # both of one publication
-    assert rule(held_out, values)["held-out publications"].note == "8 of 9"
+    assert rule(not_fitted, values)["publications not fitted to"].note == "8 of 9"
 
 
 @pytest.mark.parametrize("line", ["S9/dwell", "S14/crossover"])
@@ -94,17 +94,17 @@ def test_what_was_not_simulated_misses():
 
 
 @pytest.mark.parametrize(("misses", "holds"), [(0, True), (3, True), (4, False)])
-def test_four_of_five_held_out_lines_are_enough(misses, holds):
-    held_out = [line for line in LINES.values() if line.kind == "held-out"]
-    values = {line.id: middle(line) for line in held_out}
-    values |= {line.id: certain(-99.0) for line in held_out[:misses]}
-    lines = rule(held_out, values)
-    assert lines["held-out lines"].note == f"{19 - misses} of 19"
+def test_four_of_five_not_fitted_lines_are_enough(misses, holds):
+    not_fitted = [line for line in LINES.values() if line.kind == "not-fitted"]
+    values = {line.id: middle(line) for line in not_fitted}
+    values |= {line.id: certain(-99.0) for line in not_fitted[:misses]}
+    lines = rule(not_fitted, values)
+    assert lines["lines not fitted to"].note == f"{19 - misses} of 19"
     assert passes(lines.values()) == holds
 
 
 def test_what_judges_nothing_does_not_pass():
-    assert not passes(rule_of([], [], RULE))
+    assert not passes(rule_of([], [], RULE, {}))
 
 
 def test_a_single_exact_line_that_misses_fails_it_all():
@@ -116,11 +116,11 @@ def test_a_single_exact_line_that_misses_fails_it_all():
 
 
 def test_the_headline_names_every_miss_and_what_the_rule_asks_for():
-    held_out = [line for line in LINES.values() if line.kind == "held-out"]
-    verdicts = judge(held_out, {line.id: certain(-9.0) for line in held_out})
-    text = headline([*verdicts, *rule_of(held_out, verdicts, RULE)])
+    not_fitted = [line for line in LINES.values() if line.kind == "not-fitted"]
+    verdicts = judge(not_fitted, {line.id: certain(-9.0) for line in not_fitted})
+    text = headline([*verdicts, *rule_of(not_fitted, verdicts, RULE, {})])
     assert text.startswith("0 of 19 ")
-    assert not unnamed(text, *(line.id for line in held_out), "(0, 0 of 19;", " 0.8)")
+    assert not unnamed(text, *(line.id for line in not_fitted), "(0, 0 of 19;", " 0.8)")
 
 
 def test_words_give_target_band_and_unit():
