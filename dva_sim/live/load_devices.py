@@ -31,6 +31,7 @@ from dva_sim.worlds.site import DEFAULT_FRAME
 GUARDS: Final = 0.2  # design: share of the devices that are not in a session
 TIMEOUT: Final = 2.0  # design: a request without a reply for so long is lost [s]
 PLACES: Final = tuple((2.0 + 4.0 * n, 12.0) for n in range(10))  # design: in a corridor [m]
+FIRST: Final = 1001  # design: number of the first of each kind; scenarios have those below
 PROCESS_STRIDE: Final = 4096  # design: numbers of devices between two processes
 LONGEST: Final = 36_000.0  # design: an orphan ends by then [s]
 
@@ -145,7 +146,7 @@ class LoadDevices:
         return self.counts
 
     def _device(self, kind: str, number: int) -> AgentDevice:
-        number += 1 + PROCESS_STRIDE * self._share.number
+        number += FIRST + PROCESS_STRIDE * self._share.number
         id_tag = id_of(kind, number)
         return AgentDevice(
             id_tag=id_tag,

@@ -31,6 +31,7 @@ class Program:
 
     def __init__(self, words: tuple[str, ...], folder: Path, environment: dict[str, str]) -> None:
         name = secrets.token_hex(4)
+        self.folder = folder
         self._out, self._errors = folder / f"{name}.out", folder / f"{name}.errors"
         with self._out.open("wb") as out, self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
