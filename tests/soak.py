@@ -78,9 +78,14 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, default=Path("results/soak"))
     wish = parser.parse_args()
     wish.keep.mkdir(parents=True, exist_ok=True)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     for programs in all_gone_after(wish.keep):
         soak = begun(programs, wish.hours)
-        played = hours_of(soak, wish.hours, wish.hour, wish.seed)
+        try:
+            played = hours_of(soak, wish.hours, wish.hour, wish.seed)
+        except KeyboardInterrupt:
+            played = ["stopped by hand"]
         problems = [*played, *ended(soak)]
         soak.visitors.leave()
         write(soak, wish.keep / "samples.csv")
