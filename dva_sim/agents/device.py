@@ -261,8 +261,8 @@ class AgentDevice:
             hear = self._on_dva_beat
             self._dva_beats = self.network.subscribe(self.id_tag, dva, HEARTBEAT, hear)
         self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._bond)
-        own = self.label_of(dva)
-        self.tell(f"is registered with {own} instead of {self.label_of(before)}", "link")
+        label = self.label_of(dva)
+        self.tell(f"is registered with {label} instead of {self.label_of(before)}", "link")
         self.on_dva(dva)
         self.give_up(before)
 

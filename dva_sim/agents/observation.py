@@ -95,7 +95,7 @@ class CameraFrame(NamedTuple):
             (*values, hazards, visibility), captured = json.loads(data)
             tick, *pose = (float(value) for value in values)
             x, y, heading, speed, turn_rate = pose
-            seen = tuple(_hazard(*hazard) for hazard in hazards)
+            sights = tuple(_hazard(*hazard) for hazard in hazards)
             at = Observation(
                 tick=int(tick),
                 x=x,
@@ -103,7 +103,7 @@ class CameraFrame(NamedTuple):
                 heading=heading,
                 speed=speed,
                 turn_rate=turn_rate,
-                hazards=seen,
+                hazards=sights,
                 visibility=float(visibility),
             )
             sound = 0 <= tick < 2**53 and math.isfinite(sum(pose) + at.visibility)

@@ -336,7 +336,7 @@ class PurePursuit:
         """
         person = self.person
         reach = self.reach
-        seen = view.seen
+        observation = view.seen
         habits = self._steering_habits
         delay = view.delay if view.delay > SHORTEST else SHORTEST
         pace = person.pace * reach.speed
@@ -345,7 +345,7 @@ class PurePursuit:
         farthest = habits.farthest_look_m
         look = look if look > nearest else nearest
         look = look if look < farthest else farthest
-        ahead = route.ahead(seen.x, seen.y, seen.heading, look)
+        ahead = route.ahead(observation.x, observation.y, observation.heading, look)
         limit = habits.turns_until_rad if self._turning else habits.stops_from_rad
         self._turning = abs(ahead.bearing) > limit
         is_there = ahead.remaining < stop_before

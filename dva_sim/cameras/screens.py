@@ -103,14 +103,18 @@ class Screens:
         number, figures = entry
         while next(iter(taken)) != tick:
             taken.popitem(last=False)
-        seen = frame.observation
+        observation = frame.observation
         line: FrameLine = {
             "k": "frame",
             "t": round(1000 * now),
             "robot": self._numbers[robot],
             "number": number,
             "captured_ms": round(1000 * frame.captured),
-            "pose": [round(seen.x, 3), round(seen.y, 3), round(seen.heading, 4)],
+            "pose": [
+                round(observation.x, 3),
+                round(observation.y, 3),
+                round(observation.heading, 4),
+            ],
             "figures": figures,
         }
         self._tell(line, self._numbers[robot])
@@ -140,8 +144,8 @@ class Screens:
     def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:
         """Return the figures that may be in the picture: kind, number, place, heading, activity."""
         field = self._run.field
-        seen = frame.observation
-        here = (seen.x, seen.y)
+        observation = frame.observation
+        here = (observation.x, observation.y)
         figures = list[Any]()
         for id_tag, other in field.robots.items():
             pose = other.body.pose()

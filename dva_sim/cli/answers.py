@@ -81,12 +81,12 @@ def _compare(folder: Path, studies: Sequence[str], mark: bool, jobs: int | None)
         raise ConfigError(
             f"no answer of {missing[0]!r} is kept; {hint(missing[0], kept_names, 'kept')}"
         )
-    others = {answer.study: _changed(answer.study, folder) for answer in kept}
+    changes = {answer.study: _changed(answer.study, folder) for answer in kept}
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
         digests = digests_of(now.get(answer.study, []))
-        lines, is_stale = _described(answer, digests, others[answer.study])
+        lines, is_stale = _described(answer, digests, changes[answer.study])
         print(f"{answer.study}: {lines}. {first_and_rest(answer.answer)[0]}")
         if is_stale and not answer.stale_since:
             if mark:

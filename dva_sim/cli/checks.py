@@ -80,8 +80,8 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
 def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> ExitCode:
     trial = TRIALS[kind]
     if not names:
-        known = ", ".join(trial.known())
-        raise ConfigError(f"check {kind}: name one: mine.py:Mine, or one of {known}")
+        available = ", ".join(trial.known())
+        raise ConfigError(f"check {kind}: name one: mine.py:Mine, or one of {available}")
     return _sum_up(kind, trial.many, [_try(kind, trial, name, options) for name in names])
 
 

@@ -127,8 +127,8 @@ def _questions(comparison: Comparison) -> list[str]:
 
 def _cells(comparison: Comparison) -> list[str]:
     matched = comparison.matched
-    others = sum(not pair.is_same for pair in matched.pairs)
-    more = f", {others} of them with another configuration in each" if others else ""
+    reconfigured = sum(not pair.is_same for pair in matched.pairs)
+    more = f", {reconfigured} of them with another configuration in each" if reconfigured else ""
     lines = [f"{len(matched.pairs)} cells are in both{more}"]
     for name, rest in (("A", matched.only_first), ("B", matched.only_second)):
         if rest:

@@ -183,14 +183,14 @@ def _difference(row: Difference) -> Data:
 
 
 def _gate(text: str, verdicts: Sequence[GateVerdict]) -> Data:
-    own = [verdict for verdict in verdicts if verdict.gate.text == text]
+    matching = [verdict for verdict in verdicts if verdict.gate.text == text]
     return {
         "condition": text,
-        "failed": any(verdict.holds for verdict in own),
+        "failed": any(verdict.holds for verdict in matching),
         "groups": [
             _place(v.part, v.levels)
             | {"a": v.first, "b": v.second, "bound": v.bound, "failed": v.holds}
-            for v in own
+            for v in matching
         ],
     }
 

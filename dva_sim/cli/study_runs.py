@@ -75,9 +75,9 @@ def tune(options: TuneOptions) -> ExitCode:
             tuned = try_all(study, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
-    for seen in tuned.seen:
-        when = ", ".join(f"{name} {level}" for name, level in seen.when.items())
-        detail(f"  {when}, {tuned.tuning.key} {seen.value:g}: {seen.mean:.4g}")
+    for trial in tuned.seen:
+        when = ", ".join(f"{name} {level}" for name, level in trial.when.items())
+        detail(f"  {when}, {tuned.tuning.key} {trial.value:g}: {trial.mean:.4g}")
     for choice in tuned.chosen:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")

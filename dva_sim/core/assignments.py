@@ -18,7 +18,7 @@ from dva_sim.protocol.messages import Position
 class Assignments:
     """Event that each device works on, also while it still finishes a closed one.
 
-    How many events a device may be at is for those who give orders; here none is lost.
+    The caller limits the number of events of a device; this table accepts any number.
     """
 
     _events: dict[str, dict[int, Event]] = field(default_factory=dict)
@@ -45,7 +45,7 @@ class Assignments:
         return self._events.get(device, {}).get(number)
 
     def all(self, device: str) -> tuple[Event, ...]:
-        """Return all that a device is at, begun longest ago first."""
+        """Return all events that a device is at, in the order of its orders."""
         return tuple(self._events.get(device, {}).values())
 
     def count(self, device: str) -> int:
@@ -74,7 +74,7 @@ class Rules:
         escalate_after: An event that has waited so long for somebody is escalated [s]. 0: at
             once if nobody is free; infinite: never.
         containment: True if a confirmed event also needs a person to contain it.
-        most_waiting: More events than that do not wait: the newest is escalated at once.
+        most_waiting: Maximum number of waiting events; beyond it the newest is escalated at once.
         merge_distance: Reports of one kind nearer than this are one event [m]; 0: never.
         max_attempts: Orders given for one event before it is escalated.
         order_limit: Time limit of an order; a responder who has not settled the event by then gives
@@ -109,7 +109,7 @@ class Rules:
     severity_moves: bool = False
 
 
-STIRRED = 0.5  # who has moved less has not moved: positions are known that well [m]
+STIRRED = 0.5  # least distance that counts as a move, above the noise of positions [m]
 SET_OUT = "set out"
 MOVE = "move"
 
@@ -135,7 +135,7 @@ class Promises:
     _owed: dict[tuple[str, int], tuple[Promise, float]] = field(default_factory=dict)
 
     def overdue(self, promises: Iterable[Promise], now: float) -> list[Promise]:
-        """Return all that is owed now; what of it has been so for too long."""
+        """Replace the promises by those of now; return the overdue ones."""
         before = self._owed
         self._owed = {}
         for promise in promises:

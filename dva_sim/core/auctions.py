@@ -1,4 +1,4 @@
-"""Auctions: who was asked for a bid, who has bid what, and whether the time is up."""
+"""Auctions: invited devices, their bids, and the end of the bidding."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Auctions:
     running: dict[int, RunningAuction] = field(default_factory=dict)
 
     def announce(self, event: int, bidders: Sequence[str], now: float) -> float:
-        """Begin an auction; how long bids are taken [s]."""
+        """Begin an auction; return the time for which bids are taken [s]."""
         self.running[event] = RunningAuction(now + self.bid_within, set(bidders))
         return self.bid_within
 
@@ -60,7 +60,7 @@ class Auctions:
             auction.asked.discard(device)
 
     def close(self, events: EventTable, now: float) -> None:
-        """Forget what needs nobody to look any more, take no more bids where the time is up."""
+        """Drop auctions of events that no longer wait, and end the bidding where the time is up."""
         for number, auction in list(self.running.items()):
             event = events.open.get(number)
             if event is None or event.state is not State.PENDING:
@@ -82,14 +82,14 @@ class Auctions:
         return "open" if auction.asked else "over"
 
     def award(self, event: int, device: str) -> bool:
-        """End an auction; whether the device had bid in it."""
+        """End an auction; return True if the device had bid in it."""
         auction = self.running.pop(event, None)
         return auction is not None and device in auction.arrival
 
     def bids(
         self, events: Sequence[Event], devices: Sequence[str], now: float
     ) -> NDArray[np.float64]:
-        """Arrival on offer [s from now], shape `(events, devices)`; nan without a bid."""
+        """Return offered arrivals [s from now], shape `(events, devices)`; NaN without a bid."""
         table = np.full((len(events), len(devices)), np.nan)
         for row, event in enumerate(events):
             auction = self.running.get(event.number)

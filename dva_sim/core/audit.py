@@ -1,4 +1,4 @@
-"""Facts on their way out: the DVA hands each out once, and decides nothing by them."""
+"""Facts for recorders: the DVA hands out each fact once, and bases no decision on them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from dva_sim.protocol.facts import Fact
 
-MAX_KEPT = 10_000  # facts that nobody has taken yet; older ones are lost, and counted
+MAX_KEPT = 10_000  # maximum facts that nobody has taken yet; older ones are dropped and counted
 
 
 @dataclass

@@ -15,9 +15,9 @@ from dva_sim.protocol.control_room import FREE
 from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
-MAX_NAMED = 32
+MAX_NAMED = 32  # maximum candidates in a proposal
 NO_WAY = "there is no way"
-CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
+CANDIDATE_BYTES = 200  # size of a candidate without its texts for people [B]
 
 
 def proposal(dispatcher: Dispatcher, event: Event, now: float) -> m.Proposal:
@@ -62,7 +62,7 @@ def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate])
         return "the policy lets it wait" if free else "nobody can go"
     if advised.device in (event.responder, event.actor):
         return "was sent there by the policy"
-    # Less is not told apart in whole seconds.
+    # Texts show whole seconds, so a smaller difference would read as none.
     sooner = [c for c in free if (c.arrival_in or 0.0) < advised.arrival_in - 0.5]
     if not sooner:
         return f"the first there among {len(free)} who could go"

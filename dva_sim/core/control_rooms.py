@@ -44,8 +44,10 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
     m.Revoke: (R.SUPERVISE, "revoke"),
 }
 """Role that each message needs, and its effect in the words of a `Fact`."""
-_ASKS = m.GetEventList | m.GetDispatch | m.GetProposal | m.GetRequestLog  # and decides nothing
-LISTED_CLOSED = 50  # events that are over, of the last
+_ASKS = (
+    m.GetEventList | m.GetDispatch | m.GetProposal | m.GetRequestLog
+)  # questions, which change nothing
+LISTED_CLOSED = 50  # latest closed events in a list
 Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.AddNote
 
 
@@ -88,7 +90,7 @@ class ControlRooms:
     # --- what comes in -----------------------------------------------------------------
 
     def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> DvaAnswer:
-        """Answer what a device has asked, or decided."""
+        """Answer a question or a decision of a device."""
         need, action = NEEDS.get(type(body), (R.SUPERVISE, ""))
         if not action:
             name = type(body).__name__
@@ -101,7 +103,7 @@ class ControlRooms:
             case m.GetDispatch():
                 return DvaAnswer(content=self.status(now, sender))
             case m.GetRequestLog():
-                return DvaAnswer()  # who carries the messages has their log
+                return DvaAnswer()  # the node that carries the messages fills in its log
             case m.SetDispatch():
                 return self._set_dispatch(body, sender, now)
             case m.Revoke():
@@ -158,7 +160,7 @@ class ControlRooms:
                 advised=advised,
             )
             return replace(answer, content=self.event_status(event, now))
-        if isinstance(done, str):  # it was so already
+        if isinstance(done, str):  # nothing had to be done
             return DvaAnswer(m.OK, done, self.event_status(event, now))
         self._decided(body, event, sender, action, advised, now)
         sends = [*done, *self._dispatcher.decide(now)]
@@ -167,17 +169,17 @@ class ControlRooms:
     def _check(
         self, body: Decision, event: Event, sender: m.Device, action: str, now: float
     ) -> None:
-        """Refuse what comes too late: after another decision, or when all is over."""
+        """Refuse a decision that comes too late: after another one, or when the event is closed."""
         handling = event.handling
-        seen = getattr(body, "decisions", None)
+        decisions = getattr(body, "decisions", None)
         about = getattr(body, "device", None)
         label = self._orders.label_of(about) if about else ""
         if action not in _ON_HANDS or handling.is_already(sender.id_tag, action, label):
-            return
+            return  # a repeated decision is answered like the first: its reply may have been lost
         last = "nobody" if handling.last is None else handling.last.described(now)
         if not event.open:
             raise _Refused(m.OUT_OF_ORDER, f"event {event.number} is {event.state}; last: {last}")
-        if seen is not None and seen != handling.decisions:
+        if decisions is not None and decisions != handling.decisions:
             raise _Refused(m.OUT_OF_ORDER, f"event {event.number} was decided on since: {last}")
 
     def _acknowledge(
@@ -268,12 +270,12 @@ class ControlRooms:
 
     @staticmethod
     def _passes_on(body: m.Assign, event: Event) -> bool:
-        """Return True if a robot that looks there stays, and another answers for it."""
+        """Return True if the robot that looks there stays, and only its operator changes."""
         looks = (body.task or "confirm") == "confirm" and event.state in LOOKING
         return looks and event.responder == body.device
 
     def _may_look(self, body: m.Assign, event: Event) -> None:
-        """Refuse to take anybody from a scene, or from the way but by who knows of it."""
+        """Refuse to replace a responder on the scene, or one under way unknown to the sender."""
         label = self._orders.label_of(event.responder or "")
         if event.state is State.CONFIRMED:
             raise _Refused(m.WRONG_MODE, f"event {event.number} is confirmed: somebody has looked")
@@ -325,7 +327,7 @@ class ControlRooms:
     def _send(
         self, body: m.Assign, event: Event, entry: DeviceEntry, driver: str | None, now: float
     ) -> list[Send]:
-        """Call off who is on the way, if anybody is, and give the order."""
+        """Recall the responder that is under way, if there is one, and give the order."""
         orders = self._orders
         device = entry.device.id_tag
         looks = (body.task or "confirm") == "confirm"
@@ -337,6 +339,7 @@ class ControlRooms:
         self._dispatcher.auctions.running.pop(event.number, None)
         if (eta := self._way(entry, event)) is not None:
             event.handling.expected[device] = now, eta
+        # A person decided: it must not look later as if the policy had sent the device.
         event.handling.advised = ""
         order = orders.confirm(event, device, driver, now) if looks else None
         return [*sends, order or orders.act(event, device, now)]

@@ -36,7 +36,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT, ControlRoomRole
 from dva_sim.protocol.facts import Fact
 
-DECISIONS = 4  # in a row, where one makes the next necessary
+DECISIONS = 4  # maximum decisions in a row, where each makes the next necessary
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class Dispatcher:
         self._default = MinEta()
 
     def decide(self, now: float) -> list[Send]:
-        """Give the orders that are due now; what finds nobody in time is given up."""
+        """Give the orders that are due now; escalate events for which nobody was found in time."""
         sends: list[Send] = []
         self.auctions.close(self.orders.events, now)
         for _ in range(DECISIONS):
@@ -154,7 +154,7 @@ class Dispatcher:
         return sends
 
     def _advice(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """Return the policy's, if it makes sense; else the default's."""
+        """Return the policy's advice if it is valid, otherwise the default policy's."""
         try:
             advice = list(self.policy.advise(situation, rng))
             _check_form(advice, situation)
@@ -165,7 +165,7 @@ class Dispatcher:
         return advice
 
     def _carry_out(self, advice: Sequence[Advice], view: PolicyView, now: float) -> list[Send]:
-        """Carry out the choice: nobody is sent to two places, and nothing is given to two."""
+        """Carry out advice; send no responder to two places and give no task to two responders."""
         taken: set[int] = set()
         tasks: set[int] = set()
         sends: list[Send] = []
@@ -188,7 +188,7 @@ class Dispatcher:
                     taken.add(piece.responder)
         return sends
 
-    # --- what the rules allow; None: they do not -----------------------------------------
+    # --- orders that the rules allow; None: they forbid them -----------------------------
 
     def _assign(self, choice: Assignment, view: PolicyView, now: float) -> list[Send] | None:
         """Return the orders that an assignment means."""
@@ -202,11 +202,12 @@ class Dispatcher:
         if former is not None and not self.orders.may_preempt(former, now):
             return None
         if self._waits_for_a_person(choice, view, now):
-            return []
+            return []  # not None: the advice is not overruled, a person may still agree
         pilot = None
         if entry.device.device_type == ROBOT:
             if former is None and not view.team.operators:
                 return None
+            # Popped, so that no other order of this decision gets the same free hand.
             pilot = former.operator if former else view.team.operators.pop(0).device.id_tag
         sends = self.orders.redirect(former, now) if former else []
         responder = entry.device.id_tag
@@ -227,7 +228,7 @@ class Dispatcher:
         return self.questions.ask(event, _task_of(choice, view), device.id_tag, eta, now)
 
     def somebody_decides(self) -> bool:
-        """Return True if a device is there whose people may decide."""
+        """Return True if a device is registered whose people may decide."""
         entries = self.orders.registry.entries
         return any(
             role.includes(ControlRoomRole.DISPATCH)
@@ -310,7 +311,7 @@ def _is_to_look(send: Send) -> bool:
 
 
 def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
-    """Refuse what is not advice, or names what is not there."""
+    """Reject values that are not advice, or refer to a missing task, responder or station."""
     tasks = len(situation.tasks)
     responders = len(situation.responders)
     stations = len(situation.cover.stations) if situation.cover else 0
@@ -326,11 +327,12 @@ def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
 
 
 def _check_place(what: str, index: object, count: int) -> None:
+    # True and False would pass as the indices 1 and 0.
     if isinstance(index, bool) or not 0 <= operator.index(index) < count:  # type: ignore[arg-type]
         raise IndexError(f"there is no {what} {index!r}; there are {count}")
 
 
-REST = 10.0  # a robot has stood idle for so long before it sets out [s]
+REST = 10.0  # time for which a robot stands idle before it sets out [s]
 
 
 @dataclass
@@ -372,11 +374,11 @@ class Patrols:
         return sends
 
     def held(self, send: Send, registry: Registry, sessions: Sessions) -> list[Send]:
-        """Note that a robot has heard who holds it: if that is the DVA, it can be sent now."""
+        """Note that a robot knows its holder; if that is the DVA, return the order to set out."""
         entry = registry.entries.get(send.to)
         body = send.body
-        own = sessions.permissions.own
-        if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != own:
+        dva = sessions.permissions.own
+        if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != dva:
             return []
         if body.level == "sensors":
             return []
@@ -388,6 +390,6 @@ class Patrols:
         self._on_round.discard(robot)
 
     def _round(self, entry: DeviceEntry, session: int) -> Send:
-        """Round after round, until somebody else takes the robot."""
+        """Return the order to go round after round, until somebody else takes the robot."""
         self._on_round.add(entry.device.id_tag)
         return Send(entry.device.id_tag, m.Patrol(self.beats[entry.device.label], 0), session)

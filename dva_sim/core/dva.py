@@ -133,12 +133,13 @@ class Dva:
         return reply, self._with_revocations(answer.sends)
 
     def note(self, message: m.Message, now: float) -> list[Send]:
-        """Take a published message; nobody waits for an answer, but it may be one to act on."""
+        """Take a published message, which gets no reply; return the messages it causes."""
         entry = self.registry.heard(message.source, now)
         body = message.body
         if entry is None:
             self.refused += 1
             return []
+        # Publications are read at the device's address, so unlike requests they prove it.
         self.registry.is_there(entry, now)
         if isinstance(body, m.RobotStatus | m.PersonStatus):
             self.registry.locate(entry, body.position)
@@ -167,7 +168,7 @@ class Dva:
         return self._with_revocations(sends + self.orders.taken_up(send))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
-        """Note that a robot did not take a grant; it may have said which session would do."""
+        """Note that a robot refused a grant; its reply may state the session it needs."""
         floor = reply.content
         if reply.code == m.BAD_SESSION and isinstance(floor, m.SessionFloor):
             again = self.sessions.above(send, floor.session)
@@ -177,7 +178,7 @@ class Dva:
         return self.undelivered(send, now)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """Handle a message that did not arrive, or was declined: take it back."""
+        """Handle a message that did not arrive or was declined: undo what it was to bring about."""
         body = send.body
         sends = list[Send]()
         if isinstance(body, m.Order | m.TaskAward):
@@ -190,7 +191,7 @@ class Dva:
         elif isinstance(body, m.GetSensorInfo):
             self.sensing.on_reply(send.to, None, now)
         elif isinstance(body, m.DevSub):
-            self.sessions.permissions.end(send.session)  # it may have restarted
+            self.sessions.permissions.end(send.session)  # the robot may have restarted without it
         elif isinstance(body, m.HandoverRequest):
             sends = self.handovers.answered(send, False, now)
         elif isinstance(body, m.Emergency):
@@ -200,7 +201,7 @@ class Dva:
         return self._with_revocations(sends)
 
     def tick(self, now: float) -> list[Send]:
-        """Handle the passing of time: silent devices, deadlines, newly free responders."""
+        """Handle the passage of time: silent devices, deadlines, newly free responders."""
         sends: list[Send] = []
         for entry in self.registry.fallen_silent(now):
             sends += self._gone(entry.device.id_tag, now)
@@ -290,7 +291,7 @@ class Dva:
         """Return the messages, preceded by revocations of ended sessions."""
         return [*self.sessions.to_tell(), *sends]
 
-    # --- who is there ------------------------------------------------------------------
+    # --- registered devices --------------------------------------------------------------
 
     def _register(self, message: m.Message, body: m.Registration, now: float) -> DvaAnswer:
         registered = self.registry.entries.get(message.source)
@@ -307,10 +308,10 @@ class Dva:
             )
             return DvaAnswer(m.BUSY, text)
         if registered is not None and registered.is_new_life(message.message_id, message.timestamp):
-            sends = self._gone(message.source, now)  # it knows nothing of what it held
+            sends = self._gone(message.source, now)  # a restarted device has forgotten what it held
             if self.emergencies.holds(message.source):
-                sends.append(Send(message.source, m.Emergency()))  # nor that it is stopped
-            self.sessions.forget(message.source)  # nor which orders of a session it has obeyed
+                sends.append(Send(message.source, m.Emergency()))  # and that it is stopped
+            self.sessions.forget(message.source)  # and which orders of a session it has obeyed
         if registered is not None and registered.device.address != body.address:
             self.sessions.forget(message.source)  # its holder has to ask for the new address
         if registered is None and self.registry.is_full:
@@ -324,7 +325,7 @@ class Dva:
         return DvaAnswer(sends=sends)
 
     def _gone(self, device: str, now: float) -> list[Send]:
-        """Drop a device: what it held is free, and what it did is open to others."""
+        """Drop a device: free what it held, and open its tasks to others."""
         self.sessions.take_back_all(device)
         self.sensing.forget(device)
         self.sessions.permissions.forget(self.sessions.permissions.own, device)
@@ -336,13 +337,13 @@ class Dva:
         return entry is not None and not entry.silent
 
     def _forget_the_long_silent(self, now: float) -> None:
-        """Forget those of whom nothing is open; the others last."""
+        """Forget the devices that were silent for long and have nothing open."""
         late = list(self.registry.long_silent(now))
         for device in self._with_nothing_open(late) if late else ():
             self._forget(device)
 
     def _make_room(self, now: float) -> list[Send]:
-        """Forget the longest silent: one of whom nothing is open, if there is such."""
+        """Forget the longest silent device, preferably one that has nothing open."""
         silent = self.registry.silent
         device = next(chain(self._with_nothing_open(silent), silent), None)
         if device is None:
@@ -358,7 +359,7 @@ class Dva:
         return (d for d in devices if d not in unfinished and d not in engaged)
 
     def with_something_open(self) -> set[str]:
-        """Return the robots that the DVA must not forget: held, to be told, or stopped."""
+        """Return the robots that the DVA must not forget: held, not notified yet, or stopped."""
         return self.sessions.with_something_open() | self.emergencies.stopped().keys()
 
     def _forget(self, device: str) -> None:

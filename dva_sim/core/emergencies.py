@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 from dva_sim.core.events import Choice
 from dva_sim.protocol import messages as m
 
-UNCONFIRMED_AFTER = 30.0  # a robot says each second that it is stopped, if it is [s]
+# Stopped robots report that every second; without a report the stop is over after this time [s].
+UNCONFIRMED_AFTER = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +60,9 @@ class Emergencies:
         return {robot: stop for robot, stop in self._stops.items() if stop.released is None}
 
     def hear(self, robot: str, emergency: m.RobotEmergency, now: float) -> RobotStop:
-        """Note what a robot says of its emergency; a newer one ends an earlier release."""
+        """Note a robot's report of its emergency; a newer emergency ends an earlier release."""
         stop = self._stops.get(robot)
+        # The robot's tick tells emergencies apart: an old release must not free a new stop.
         if stop is not None and stop.tick == emergency.tick:
             stop = replace(stop, heard=now)
         else:
@@ -75,7 +77,7 @@ class Emergencies:
         self._stops[robot] = stop
 
     def release(self, robot: str, choice: Choice) -> None:
-        """Note that a person has released a robot, which will ask."""
+        """Note that a person has released a robot, which asks for its release itself."""
         self._stops[robot] = replace(self._stops[robot], released=choice)
         self.changes += 1
 

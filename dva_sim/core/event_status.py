@@ -9,8 +9,8 @@ from dva_sim.core.questions import Question, Questions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
-MAX_LISTED = 16
-EVENT_BYTES = 950  # of one event without what people have written, at most [B]
+MAX_LISTED = 16  # maximum events in a list
+EVENT_BYTES = 950  # maximum size of an event without people's texts [B]
 _BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
 
 
@@ -92,7 +92,7 @@ def _proposed(question: Question | None, now: float) -> m.Proposed | None:
 def _written(status: m.EventStatus) -> int:
     """Return the room for what people have written [B]."""
     last = status.last_decision
-    seen = status.acknowledged
-    texts = [status.note or "", seen.label if seen else ""]
+    acknowledgement = status.acknowledged
+    texts = [status.note or "", acknowledgement.label if acknowledgement else ""]
     texts += [last.label, last.reason or ""] if last else []
     return sum(map(xml_size, texts))

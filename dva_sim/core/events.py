@@ -32,15 +32,16 @@ class State(StrEnum):
 S = State
 STEPS = ("detected", "assigned", "departed", "arrived", "confirmed", "contained", "closed")
 ACT_STEPS = ("act_assigned", "act_departed", "act_arrived", "contained", "closed")
-FINAL = frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED, S.EXPIRED})  # and CONFIRMED, mostly
+# CONFIRMED is final, too, unless the event needs containment: see `Event.open`.
+FINAL = frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED, S.EXPIRED})
 LOOKING = (S.ASSIGNED, S.ON_SCENE)
 """States with an active order to look."""
 
-MAX_OPEN = 10_000  # events at the same time; a report of one more is refused
-KEPT_CLOSED = 1000  # a late word on one of the last is still understood
-MAX_SOURCES = 64  # whose reports of one event are told apart
-DEGREE = 111_000.0  # of latitude [m]
-SAME_SPOT = 0.001  # where reports are not merged, what is taken back was reported just here [m]
+MAX_OPEN = 10_000  # maximum open events; reports of further ones are refused
+KEPT_CLOSED = 1000  # closed events that are kept, so that late reports about them are accepted
+MAX_SOURCES = 64  # maximum reporters of one event that are told apart
+DEGREE = 111_000.0  # length of a degree of latitude [m]
+SAME_SPOT = 0.001  # without merging, a report is withdrawn only from where it was made [m]
 
 
 class Choice(NamedTuple):
@@ -52,7 +53,7 @@ class Choice(NamedTuple):
         action: Kind of decision, as in `Fact`.
         time: Time [s].
         reason: Reason in words; may be empty.
-        device: About whom; empty: about nobody.
+        device: Device that it concerns; may be empty.
     """
 
     author: str
@@ -77,12 +78,12 @@ class Handling:
 
     Attributes:
         decisions: Number of decisions; a decision made on an older number is too late.
-        last: The last of it.
+        last: Latest decision.
         acknowledged: First acknowledgement.
-        note: The newest.
+        note: Latest note.
         taken_off: Devices that the policy may no longer send there.
         expected: Time of the order [s] and expected travel time [s], by device.
-        advised: Id of whom the policy has sent or would have sent last; empty: nobody.
+        advised: Id of the device that the policy last sent, or would have sent; may be empty.
     """
 
     decisions: int = 0
@@ -266,7 +267,7 @@ def _transition_looking_pending(event: Event, now: float) -> None:
 def _transition_unconfirmed_confirmed(event: Event, now: float) -> None:
     # Responder and operator stay: they may not have reported `done` yet.
     event.times["confirmed"] = now
-    event.waiting_since = now  # for somebody to contain it, from the beginning
+    event.waiting_since = now  # a new wait begins, for somebody to contain it
     if not event.open:
         event.times["closed"] = now
 
@@ -381,6 +382,7 @@ class EventTable:
         if self.merge_distance <= 0:
             return None
         limit = self.merge_distance
+        # The oldest event within the limit, which need not be the nearest.
         every = (e for e in self.open.values() if e.kind == kind)
         return next((e for e in every if apart(e.position, position) < limit), None)
 
@@ -400,7 +402,7 @@ class EventTable:
         self.touch(event)
 
     def note_source(self, event: Event, source: str, confidence: float) -> None:
-        """Note which device has reported an event; said twice it is not more certain."""
+        """Note which device has reported an event; repeating a report does not add confidence."""
         if source in event.sources or len(event.sources) < MAX_SOURCES:
             event.sources[source] = max(confidence, event.sources.get(source, 0.0))
 
@@ -455,13 +457,13 @@ class EventTable:
             self.waiting.pop(event.number, None)
 
     def changes(self) -> list[Event]:
-        """Return the events that have changed since this was last asked."""
+        """Return the events that have changed since the last call."""
         changed = self._changed
         self._changed = {}
         return list(changed.values())
 
     def in_state(self, *states: State) -> Iterator[Event]:
-        """Open events in one of these states, oldest first."""
+        """Return the open events in one of these states, oldest first."""
         return (e for e in self.open.values() if e.state in states)
 
 

@@ -1,4 +1,4 @@
-"""Handing a robot over: who has it, who asks for it, and when the next one may have it.
+"""Handover of robots: the holder, the device that asks, and when it may take over.
 
 A robot changes hands at a standstill (S2): its holder gives it up, or a supervisor takes it; the
 robot acknowledges that the session is over; it is seen to stand; only then
@@ -16,11 +16,11 @@ from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.wire_size import sent_time
 
-ANSWER_WITHIN = 30.0  # a holder that has not answered so long after it was asked declines [s]
-STOP_WITHIN = 30.0  # a robot that is not seen to stand by then is not handed over [s]
-FETCH_WITHIN = 30.0  # whoever has not come for it by then wants it no longer [s]
-DECLINED_FOR = 10.0  # a holder that has declined is not asked again for so long [s]
-STANDING = 0.02  # [m/s, rad/s]
+ANSWER_WITHIN = 30.0  # a holder that has not answered within this time declines [s]
+STOP_WITHIN = 30.0  # a robot that has not stopped within this time is not handed over [s]
+FETCH_WITHIN = 30.0  # time for which a stopped robot is reserved for its next holder [s]
+DECLINED_FOR = 10.0  # a holder that has declined is not asked again for this time [s]
+STANDING = 0.02  # a robot slower than this stands [m/s, rad/s]
 
 
 class Step(StrEnum):
@@ -83,9 +83,10 @@ class Handovers:
         return m.Holder(device, label, sent_time(held_for))
 
     def _noted(self, robot: str, session: int, now: float) -> float:
-        """Return since when a session is known to hold a robot [s]."""
+        """Return when a session was first seen to hold a robot [s]."""
         if self._since.get(robot, (0, 0.0))[0] != session:
             grants = self.sessions.permissions.grants
+            # Cleaned only now and then, so that a call takes constant time on average.
             if len(self._since) > 2 * len(grants) + 64:
                 self._since = {r: since for r, since in self._since.items() if r in grants}
             self._since[robot] = session, now
@@ -103,7 +104,7 @@ class Handovers:
     def wish(
         self, request: m.PermissionRequest, asker: m.Device, holder: m.Holder, now: float
     ) -> tuple[str, list[Send]]:
-        """Return how a wish for another's robot stands, in words, and what to send."""
+        """Return how a request for another's robot stands, in words, and what to send."""
         robot = request.device
         handover = self.under_way.get(robot)
         if request.takeover == "force":
@@ -124,7 +125,7 @@ class Handovers:
         return Step.STOPPING
 
     def answered(self, send: Send, gives: bool, now: float) -> list[Send]:
-        """Take the word of a holder that gives its robot up, or does not."""
+        """Take the answer of a holder that gives its robot up, or does not."""
         body = send.body
         assert isinstance(body, m.HandoverRequest)
         handover = self.under_way.get(body.device)
@@ -138,7 +139,7 @@ class Handovers:
         return []
 
     def _stop(self, robot: str, asker: str, now: float) -> list[Send]:
-        """Let nobody drive it any more; what it was to look at is open to others."""
+        """Let nobody drive the robot any more; its task is open to others."""
         self.under_way[robot] = Handover(asker, Step.STOPPING, now + STOP_WITHIN)
         self.sessions.reserved.add(robot)
         sends = self.orders.taken_away(robot, now)
@@ -148,7 +149,7 @@ class Handovers:
         return sends
 
     def seen(self, robot: str, status: m.RobotStatus, now: float) -> None:
-        """Hear from a robot how it is: it may stand by now, and know that its session is over."""
+        """Take a robot's status: once it stands and knows its session is over, it is ready."""
         handover = self.under_way.get(robot)
         if (
             handover is None
@@ -166,7 +167,7 @@ class Handovers:
         return min((handover.until for handover in self.under_way.values()), default=math.inf)
 
     def lapse(self, now: float) -> None:
-        """End what lasts too long, and what nobody is there for."""
+        """End handovers that take too long, or whose asker is gone."""
         entries = self.orders.registry.entries
         for robot, handover in list(self.under_way.items()):
             asker = entries.get(handover.asker)

@@ -1,4 +1,4 @@
-"""Orders: who has to do what, and what their course makes of the events."""
+"""Orders: which device has to do what, and how its progress changes the event."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.facts import Fact
 
-ORDER_DONE = "done"  # said by the DVA to who has an order: it is over, stop
+ORDER_DONE = "done"  # sent by the DVA to a device with an order: the order is over, stop
 
 
 @dataclass
 class Orders:
-    """All orders of the DVA.
+    """Orders of the DVA, and the changes of events that follow from them.
 
     Attributes:
         engaged: Current task of each device.
@@ -53,7 +53,8 @@ class Orders:
     emergencies: Emergencies = field(default_factory=Emergencies)
     unwatched: set[str] = field(default_factory=set)
     _pauses: list[float] = field(default_factory=list)
-    _from_afar: set[tuple[str, int]] = field(default_factory=set)  # who said so, of which event
+    # Arrivals reported while the last known position was too far away; see `arrived`.
+    _from_afar: set[tuple[str, int]] = field(default_factory=set)  # (device, event number)
     _promises: Promises = field(init=False)
 
     def __post_init__(self) -> None:
@@ -64,7 +65,7 @@ class Orders:
     def confirm(
         self, event: Event, responder: str, operator: str | None, now: float, award: bool = False
     ) -> Send:
-        """Send somebody to look; an award goes to who has bid, its operator hears later."""
+        """Send somebody to look; an award goes to the bidder, and its operator hears later."""
         self.events.move(event, Cause.ORDERED, now)
         event.responder = responder
         event.operator = operator
@@ -102,12 +103,12 @@ class Orders:
     def redirect(self, event: Event, now: float) -> list[Send]:
         """Withdraw an order whose responder is needed elsewhere; does not count as an attempt."""
         event.preemptions += 1
-        event.attempts -= event.taken_up
+        event.attempts -= event.taken_up  # counted when the order was taken up
         self.counters["preempted"] += 1
         return self.transition(event, Cause.REDIRECTED, now)
 
     def again(self) -> list[Send]:
-        """Return all current orders, repeated by a DVA that was restarted."""
+        """Return all current orders, which a restarted DVA repeats."""
         sends = []
         for event in self.events.open.values():
             if event.state in LOOKING and event.responder is not None:
@@ -141,6 +142,7 @@ class Orders:
 
     def _noted_as_taken_up(self, event: Event) -> None:
         if not event.taken_up:
+            # Counted here and not when ordered, so that unanswered orders use up no attempts.
             event.taken_up = True
             event.attempts += 1
             self.events.touch(event)
@@ -162,7 +164,7 @@ class Orders:
         self._free(event, event.responder, event.operator)
         return []
 
-    # --- what those who have them say ---------------------------------------------------
+    # --- reports of the devices that have them -------------------------------------------
 
     def has_order(self, event: Event, device: str) -> bool:
         """Return True if a device may report on an order; a robot leaves that to its operator."""
@@ -179,7 +181,7 @@ class Orders:
         self.events.touch(event)
 
     def arrived(self, event: Event, device: str, now: float) -> None:
-        """Note that somebody says to be there, which counts once it has told where it is."""
+        """Note a reported arrival; it counts once the device's known position is near the event."""
         self.departed(event, device, now)
         goes = device if device == event.actor else event.responder
         if goes is None or self._is_near(event, goes):
@@ -189,7 +191,7 @@ class Orders:
             self._from_afar.add((goes, event.number))
 
     def moved(self, device: str, now: float) -> None:
-        """Note where a device is: that may be where it said that it was."""
+        """Note a new position, which may confirm an arrival that was reported from afar."""
         for event in self.engaged.all(device) if self._from_afar else ():
             if (device, event.number) in self._from_afar and self._is_near(event, device):
                 self._is_there(event, device, now)
@@ -224,6 +226,7 @@ class Orders:
             return []
         goes = device if device == event.actor else event.responder
         if self.has_order(event, device) and (goes is None or self._was_near(event, goes)):
+            # A finding implies both steps, whose own reports may have been lost.
             self.departed(event, device, now)
             self._is_there(event, goes, now)
         cause = _FINDINGS.get(finding)
@@ -275,7 +278,7 @@ class Orders:
             self._release(event)
 
     def give_up(self, now: float) -> list[Send]:
-        """Escalate what has waited too long, and the newest of more than may wait."""
+        """Escalate events that have waited too long, and the newest of too many."""
         most = self.rules.most_waiting
         waiting = self.events.waiting
         late = {n: e for n, e in waiting.items() if self._wait_ends(e) <= now}
@@ -287,7 +290,7 @@ class Orders:
         ]
 
     def take_back(self, now: float) -> list[Send]:
-        """Open orders that were not carried out in time to others."""
+        """Take back orders that were not carried out in time, so that others can get them."""
         self._pauses = [until for until in self._pauses if until > now]
         late = [(d.device, d.event, f"did not {d.owes}") for d in self._overdue(now)]
         if math.isfinite(self.rules.order_limit):
@@ -312,14 +315,15 @@ class Orders:
         return late
 
     def _owed(self) -> Iterator[Promise]:
-        """Yield what every device owes now, for devices with several orders the first one.
+        """Yield the step that each device owes now; of several orders, for the first.
 
-        And may be at any of them: then a robot may stand until it is its turn.
+        A device with several orders owes no movement: while it deals with one event, the robot
+        of another may stand.
         """
         for device in self.engaged:
-            event, *others = self.engaged.all(device)
+            event, *other_events = self.engaged.all(device)
             owes = self._owes(device, event)
-            if owes == MOVE and (others or device in self.unwatched):
+            if owes == MOVE and (other_events or device in self.unwatched):
                 continue
             responder = device if device == event.actor else event.responder
             if owes and responder is not None:
@@ -327,7 +331,7 @@ class Orders:
 
     @staticmethod
     def _owes(device: str, event: Event) -> str:
-        """Return what is owed: nothing if it is there, or stands by, or has not answered yet."""
+        """Return the step owed: none if the device is there, stands by or has not answered yet."""
         if device == event.actor and event.open:
             taken_up = event.act_taken_up
             step = "act_"
@@ -347,6 +351,7 @@ class Orders:
         """Return when the next order waits, or takes, too long [s]."""
         rules = self.rules
         waiting = self.events.waiting
+        # The end of a pause matters only while an event waits for somebody to be free.
         ends = [min(self._pauses, default=math.inf) if waiting else math.inf]
         if math.isfinite(rules.escalate_after):
             ends += (self._wait_ends(e) for e in waiting.values())
@@ -376,7 +381,7 @@ class Orders:
         if event.open and device == event.actor:
             return [Send(device, over), *self._act_ends(event, device, True, now)]
         if event.state not in LOOKING:
-            self._finished(event, device)  # its last word must have been lost
+            self._finished(event, device)  # its report of `done` must have been lost
             return []
         assert event.responder is not None
         event.failed.add(event.responder)
@@ -414,7 +419,7 @@ class Orders:
                 self._free_actor(event)
                 return [over]
             return [over, *self._actor_gone(event, now)]
-        event.attempts -= event.taken_up
+        event.attempts -= event.taken_up  # counted when the order was taken up
         if event.taken_up:
             event.waiting_since = now
         return self.transition(event, Cause.RECALLED, now)
@@ -422,7 +427,7 @@ class Orders:
     # --- what becomes of the event -----------------------------------------------------
 
     def transition(self, event: Event, cause: Cause, now: float, device: str = "") -> list[Send]:
-        """Change the state of an event as `TRANSITIONS` says; return whom to tell what.
+        """Change the state of an event as `TRANSITIONS` says; return the messages to send.
 
         Args:
             event: The event.
@@ -494,7 +499,7 @@ class Orders:
             )
             self.decided(event, fact)
 
-    # --- the small print ---------------------------------------------------------------
+    # --- helpers -----------------------------------------------------------------------
 
     def _pause(self, device: str, now: float) -> None:
         """Bar a device that did not take up an order from new orders for a while."""
@@ -519,8 +524,8 @@ class Orders:
     def _goes_on(self, event: Event, taken_up: bool, now: float) -> bool:
         """Return True if an event may wait for another responder after an order failed.
 
-        Where nobody took the order up it has waited all the time: so nobody can keep an event
-        from its deadline by not answering.
+        If nobody took the order up, the event has waited all along: a device that does not answer
+        cannot postpone its deadline.
         """
         if not taken_up and now > self._wait_ends(event):
             return False
@@ -547,7 +552,7 @@ class Orders:
     def _stand_down(self, event: Event, but: str) -> list[Send]:
         """Release devices that stood by at, or were to contain, an event that no longer needs them.
 
-        So it is where nobody looks any longer: who stands by may be the one to look.
+        A device also stands down when nobody looks any longer: it may be the next to look.
         """
         actor = event.actor
         needed = event.open and event.state is not State.PENDING

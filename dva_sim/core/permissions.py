@@ -1,4 +1,4 @@
-"""Access rules: who may request what, independent of who holds it at the moment."""
+"""Access rules: which device may request what, independent of the current holder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class AccessRule:
         levels: Levels that they may request.
         sensors: Sensors that they may read; None: all.
         since: Start of the permission [s].
-        until: Up to when [s]; what is still held then is taken back.
+        until: End of the permission [s]; what is still held then is taken back.
     """
 
     holders: frozenset[str] = frozenset()
@@ -51,11 +51,10 @@ class AccessRule:
 
 @dataclass(frozen=True)
 class Access:
-    """The rules: what no rule allows is refused. Only `DRIVERS` drive,
-    whatever the rules say.
+    """Rules of access: what no rule allows is refused, and only `DRIVERS` drive.
 
     Attributes:
-        rules: Any one that allows something suffices.
+        rules: Rules; a request needs one that allows it.
     """
 
     rules: Sequence[AccessRule] = field(default_factory=lambda: (AccessRule(),))
@@ -76,7 +75,7 @@ class Access:
         return tuple(s for s in names if any(r.sensors is None or s in r.sensors for r in rules))
 
     def ends(self, holder: Device, robot: Device, level: str, now: float) -> float:
-        """Return up to when a device may have a level of permission on a robot [s]."""
+        """Return the time until which a device may have a level of permission on a robot [s]."""
         levels = _INCLUDES.get(level, {level})
         rules = (r for r in self.rules if r.is_about(holder, robot, now) and levels <= r.includes)
         return max((r.until for r in rules), default=now)

@@ -28,7 +28,7 @@ class Question:
 
 @dataclass
 class Questions:
-    """All that is open; one for each event and stage.
+    """Open questions, one for each event and stage.
 
     The policy's proposal may change while it waits; the time left does not.
 
@@ -45,7 +45,7 @@ class Questions:
     _now: dict[tuple[int, str], Question] = field(default_factory=dict)
 
     def ask(self, event: Event, task: str, device: str, eta: float, now: float) -> bool:
-        """Put a question, or put it again; False: nobody has answered in time."""
+        """Ask a question, or ask it again; return False if nobody has answered in time."""
         key = event.number, "confirm" if task == "confirm" else "contain"
         question = self._open.get(key)
         until = now + self.within if question is None else question.until
@@ -55,7 +55,7 @@ class Questions:
         return True
 
     def settle(self) -> list[Event]:
-        """Drop questions that were not asked again; return the events of which that changed."""
+        """Drop questions that were not asked again; return the events whose question changed."""
         before = self._open
         self._open = self._now
         self._now = {}
@@ -64,7 +64,7 @@ class Questions:
         return gone + [q.event for q in new]
 
     def of(self, number: int) -> Question | None:
-        """Return the question about an event: about looking before about dealing with it."""
+        """Return an event's question: the one about looking before the one about containing it."""
         return self._open.get((number, "confirm")) or self._open.get((number, "contain"))
 
     def next_deadline(self) -> float:

@@ -25,9 +25,9 @@ from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})
-LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # for devices, in this order
-DEVICE_BYTES = 175  # of one listed device without its label, at most [B]
-MAX_LISTED = 64
+LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # types in the device list, in this order
+DEVICE_BYTES = 175  # maximum size of a listed device without its label [B]
+MAX_LISTED = 64  # maximum devices in one list
 MAX_DEVICES = 20_000
 DAY = 86_400.0  # [s]
 
@@ -44,7 +44,7 @@ class DeviceEntry:
         silent: True if it has been silent for longer than the time-out.
         registrations: MessageID and timestamp of its last ones.
         free_from: Time until which it gets no order, because it declined one [s].
-        place: Place in the order of registration, from 0.
+        place: Index in the order of registration, from 0.
         there_until: Time until which it counts as being at its address, as it was heard from there
             [s].
     """
@@ -94,8 +94,8 @@ class Registry:
             something open [s].
         most: Maximum number of devices.
         entries: Devices in the order of registration.
-        version: Grows whenever somebody comes, goes silent, returns, is forgotten, or is called
-            otherwise.
+        version: Number that grows whenever a device registers, falls silent, returns, is
+            forgotten, or changes its label or address.
     """
 
     silent_after: float = 10.0
@@ -113,7 +113,7 @@ class Registry:
     _moved: dict[str, DeviceEntry | None] = field(default_factory=dict)
     _listed: tuple[int, DeviceList] = (-1, DeviceList(()))  # version, list
     _places: int = 0
-    _looks: dict[str, str] = field(default_factory=dict)  # of each label as it was given, by id
+    _looks: dict[str, str] = field(default_factory=dict)  # look of each label as registered, by id
     _alike: dict[str, set[str]] = field(default_factory=dict)  # ids, by look
 
     @property
@@ -148,7 +148,7 @@ class Registry:
         return entry
 
     def is_there(self, entry: DeviceEntry, now: float) -> None:
-        """Note that a device is at its address: what it publishes there has come, or it is new."""
+        """Note that a device is at its address, since it published from there or is new."""
         entry.there_until = max(entry.there_until, now + self.silent_after)
 
     def is_elsewhere(self, id_tag: str, address: str, now: float) -> bool:
@@ -183,7 +183,7 @@ class Registry:
                 del self._alike[look]
 
     def _label_of(self, id_tag: str, label: str) -> str:
-        """Return the label by which a device is shown, if it is to be this one."""
+        """Return the label under which a device is shown that registers with this one."""
         alike = [self.entries[other] for other in self._alike.get(look_of(label), set()) - {id_tag}]
         for entry in alike:
             if entry.silent and entry.device.label == distinct(label, "", ()):
@@ -240,7 +240,7 @@ class Registry:
 
     @property
     def silent(self) -> Iterable[str]:
-        """All that are silent, the longest silent first."""
+        """Silent devices, the longest silent first."""
         return self._silent
 
     def next_silence(self) -> float:
@@ -248,14 +248,16 @@ class Registry:
         longest = next(iter(self._heard.values()), None)
         if longest is None:
             return math.inf
-        return math.nextafter(longest.last_heard + self.silent_after, math.inf)  # not before
+        return math.nextafter(
+            longest.last_heard + self.silent_after, math.inf
+        )  # silent: longer than the time-out
 
     def of_type(self, device_type: str) -> Iterable[DeviceEntry]:
         """Return the registered devices of a type that are not silent, in order of registration."""
         return (e for e in self._of_type[device_type].values() if not e.silent)
 
     def device_list(self) -> DeviceList:
-        """Return the devices that others can do something with, as many as fit into a message."""
+        """Return the list of devices for other devices, as many as fit into a message."""
         if self._listed[0] != self.version:
             self._listed = self.version, DeviceList(tuple(self._as_many_as_fit()))
         return self._listed[1]
@@ -269,7 +271,7 @@ class Registry:
             yield entry.device
 
     def located(self, device_type: str) -> Collection[DeviceEntry]:
-        """Devices of a type of which is known where they are, in any order, silent ones too."""
+        """Return the devices of a type with a known position, in any order, even silent ones."""
         return self._located[device_type].values()
 
     def changes(self) -> dict[str, DeviceEntry | None]:
@@ -289,9 +291,9 @@ class Registry:
         self.version += 1
 
 
-RATE: Final = 500.0  # design: on average; 5000 devices renew as often [1/s]
-BURST: Final = 2000  # design: at once, so that a whole fleet comes back in seconds
-MAX_PEERS: Final = 10_000  # of which that is remembered
+RATE: Final = 500.0  # design: mean registrations of a peer; 5000 devices renew as often [1/s]
+BURST: Final = 2000  # design: registrations at once, so that a fleet comes back in seconds
+MAX_PEERS: Final = 10_000  # maximum peers whose registrations are counted
 
 
 class RegistrationAllowance(NamedTuple):

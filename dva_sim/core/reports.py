@@ -1,4 +1,4 @@
-"""Reports about events, by sensors and people, and what those who were sent there say."""
+"""Reports about events by sensors and people, and findings of the devices sent there."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from dva_sim.core.severity import Grading
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT, ControlRoomRole
 
-FOUND_WITHIN = 20.0  # farthest that a finding may be from its event [m]
-REACH = 20.0  # farthest source of what a robot's sensor measures [m]; assumed
-CONFIDENCE = 0.6  # in what a robot's sensor alone reports; assumed
-SEVERITY = 0.5  # of an event whose source nobody has seen
-NO_NEWS = 600.0  # after an event is settled, its place is reported no more for so long [s]; assumed
+FOUND_WITHIN = 20.0  # maximum distance of a finding from its event [m]
+REACH = 20.0  # maximum distance of a source that a robot's sensor measures [m]; assumed
+CONFIDENCE = 0.6  # confidence in a report by a robot's sensor alone; assumed
+SEVERITY = 0.5  # severity of an event whose source nobody has seen
+NO_NEWS = 600.0  # time for which sensors raise no new event where one was settled [s]; assumed
 _FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
 
 
@@ -81,7 +81,7 @@ class Reports:
     # --- by anybody ----------------------------------------------------------------------
 
     def sighted(self, source: DeviceEntry, body: m.EventReport, now: float) -> DvaAnswer:
-        """Book what a device sees that was not sent; a control room needs a role for it.
+        """Book a sighting by a device that was not sent there; a control room needs a role for it.
 
         A device by which people report gets the event in return, and can follow it from then on.
         """
@@ -96,8 +96,8 @@ class Reports:
         answer = self._sighted(device.id_tag, body, now)
         event = self.events.near(body.kind, body.position)
         if event is None:  # reports are not merged
-            own = self.events.reported_by(device.id_tag, body.kind, body.position)
-            event = own[-1] if own else None
+            events = self.events.reported_by(device.id_tag, body.kind, body.position)
+            event = events[-1] if events else None
         if event is None:
             return answer
         if is_room:
@@ -127,7 +127,7 @@ class Reports:
         return DvaAnswer(sends=sends + self.dispatcher.decide(now))
 
     def _said_again(self, source: str, body: m.EventReport, now: float) -> Event | None:
-        """Return the event that people have found, or were called to, if a device repeats it."""
+        """Return the settled event that a device reports again, if there is one."""
         if not self.dispatcher.orders.rules.severity_moves:
             return None
         near = max(self.events.merge_distance, SAME_SPOT)
@@ -164,7 +164,7 @@ class Reports:
             event.position = body.position
             return event, []
         if event.state is State.CONFIRMED:
-            return None, []  # people are at it: what was reported may be something else
+            return None, []  # people are there: the report may be about something else
         return None, self.dispatcher.orders.transition(event, Cause.SUPERSEDED, now)
 
     def _is_only_felt(self, event: Event) -> bool:
@@ -188,18 +188,18 @@ class Reports:
             counters["event raised by a sensor"] += 1
             report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
             return self._sighted(robot, report, now)
-        others = event.sources.keys() - {robot}
+        witnesses = event.sources.keys() - {robot}
         self.events.merge(event, 0.0)
         self.events.note_source(event, robot, CONFIDENCE)
         is_near = apart(event.position, place) < self.dispatcher.orders.rules.merge_distance
-        if not (is_near and others) or event.state is State.CONFIRMED:
+        if not (is_near and witnesses) or event.state is State.CONFIRMED:
             return DvaAnswer()
         counters["event confirmed by a sensor"] += 1
         sends = self.dispatcher.orders.transition(event, Cause.SENSED, now)
         return DvaAnswer(sends=sends + self.dispatcher.decide(now))
 
     def _grade(self, robot: str, body: m.SensorValue, place: m.Position, now: float) -> None:
-        """Let a value that stands above its alarm level say how grave the event nearby is."""
+        """Raise the severity of a nearby event by a sensor value above its alarm level."""
         times = self.sensing.times_alarm(robot, body.sensor)
         if not times:
             return

@@ -18,15 +18,15 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
-MAX_LOGGED: Final = 256  # requests that are kept
-MAX_LISTED: Final = 32  # of one answer
-KEPT_FOR: Final = 60.0  # after the last question for them, as a `DevSub` [s]
-SHOWN_BYTES: Final = 4096  # of a request, and of its answer where both fit into a message [B]
-ENTRY_BYTES: Final = 300  # of one request without all bytes and the text of its answer, at most [B]
+MAX_LOGGED: Final = 256  # maximum requests that are kept
+MAX_LISTED: Final = 32  # maximum requests in one answer
+KEPT_FOR: Final = 60.0  # requests are kept this long after somebody asked, like a `DevSub` [s]
+SHOWN_BYTES: Final = 4096  # maximum bytes shown of a request, and of its reply if both fit [B]
+ENTRY_BYTES: Final = 300  # maximum size of an entry without its shown bytes and text [B]
 _NAMES: Final = "|".join(
     sorted(name for name in limits.names() if limits.types_of(name) & {"Session", "SessionID"})
 )
-MAX_DIGITS: Final = 20  # of a session
+MAX_DIGITS: Final = 20  # maximum decimal digits of a 64-bit session
 _DIGIT: Final = re.compile(rb"\d")
 _SESSION: Final = re.compile(rf"(<(?:{_NAMES})\s*>)([^<]*)".encode())
 
@@ -110,6 +110,7 @@ def _entry(request: KeptRequest, now: float) -> m.LoggedRequest:
         code=None if reply is None else reply.code,
         text=None if reply is None else reply.text or None,
     )
+    # Base64 turns three bytes into four characters.
     room = max(0, LIST_BYTES - ENTRY_BYTES - _size(entry)) // 4 * 3
     return replace(entry, reply=_shown(request.answer, room) or None)
 
@@ -130,4 +131,4 @@ def without_sessions(data: bytes) -> bytes:
 def _public_half(session: bytes) -> bytes:
     if session.isdigit() and len(session) <= MAX_DIGITS:
         return str(int(session) >> LOW_BITS << LOW_BITS).encode()
-    return _DIGIT.sub(b"0", session)  # as wrong as it was
+    return _DIGIT.sub(b"0", session)  # still as malformed as it arrived

@@ -1,4 +1,4 @@
-"""Requests for robots: who may have one, and who gets it."""
+"""Requests for robots: which device may have one, and which gets it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class RobotAccess:
         self.next_end = access.next_end(-1.0)
 
     def request(self, asker: DeviceEntry, body: m.PermissionRequest, now: float) -> DvaAnswer:
-        """Grant a robot or its sensors, or say why not."""
+        """Grant a robot or its sensors, or return why not."""
         answer = self._request(asker.device, body, now)
         in_use = body.takeover == "force" or asker.device.device_type == CONTROL_ROOM
         if in_use and body.level != "sensors":

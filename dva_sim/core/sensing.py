@@ -1,8 +1,8 @@
 """Sensors of robots, and the events that the DVA infers from their values.
 
-The DVA asks a robot for its sensors once somebody wants to know. Where it was told to heed some of
-them it reads them as any other subscriber does, by a permission of its own, and looks for values
-that stand above a threshold several times in a row.
+The DVA asks robots for their sensors once a device requests them. Sensors with an alarm it reads
+like any other subscriber, by a permission of its own, and looks for values that are above a
+threshold several times in a row.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
 from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
-RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
+RENEW = 20.0  # interval of renewals; a robot ends a subscription 60 s after the last one [s]
 VALUES_IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
 
-LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
-MAX_LISTED = 64
+LINE_BYTES, SENSOR_BYTES = 80, 55  # maximum size of the markup of a robot and of a sensor [B]
+MAX_LISTED = 64  # maximum robots in one list
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Sensing:
     # --- which sensors there are -------------------------------------------------------
 
     def met(self, robot: str) -> list[Send]:
-        """Ask a robot that has registered for its sensors, if anybody cares."""
+        """Ask a robot that has registered for its sensors, if they are used or requested."""
         if not (self._wanted or self.alarms) or robot in self.known or robot in self._asked:
             return []
         self._asked.add(robot)
@@ -78,7 +78,7 @@ class Sensing:
             del self._times[key]
 
     def on_reply(self, robot: str, content: object, now: float) -> None:
-        """Take a robot's answer, or its lack; of one that is gone meanwhile nothing is kept."""
+        """Take a robot's answer, or its lack; ignore a robot that is gone meanwhile."""
         if robot not in self._asked:
             return
         self._asked.remove(robot)
@@ -91,11 +91,11 @@ class Sensing:
             self._due[robot] = now
 
     def ask_all(self, registry: Registry, robot: str | None) -> list[Send]:
-        """Ask one robot or all for sensors, for somebody: from now on everyone is asked."""
+        """Ask one robot or all for their sensors; from now on every new robot is asked."""
         self._wanted = True
         self._mute.discard(robot or "")
         robots = (entry.device.id_tag for entry in registry.of_type(ROBOT))
-        return [send for one in robots if one not in self._mute for send in self.met(one)]
+        return [send for id_tag in robots if id_tag not in self._mute for send in self.met(id_tag)]
 
     def answer(self, registry: Registry, robot: str | None) -> DvaAnswer:
         """List the sensors of one or all robots; the robots are asked on the first request."""
@@ -108,8 +108,8 @@ class Sensing:
             return DvaAnswer(m.BUSY, "the robots are being asked; ask again", sends=sends)
         lines = list[m.DeviceSensors]()
         room = LIST_BYTES
-        for one in (one for one in robots if one in self.known):
-            line, taken = _line(one, self.known[one], room)
+        for id_tag in (id_tag for id_tag in robots if id_tag in self.known):
+            line, taken = _line(id_tag, self.known[id_tag], room)
             if line is None or len(lines) == MAX_LISTED:
                 break
             lines.append(line)
@@ -125,8 +125,8 @@ class Sensing:
             self._due[robot] = now + RENEW
             entry = registry.entries.get(robot)
             if entry is not None and not entry.silent:
-                held = sessions.observes(robot)
-                wishes = self._wishes(robot, held) if held else []
+                sensors = sessions.observes(robot)
+                wishes = self._wishes(robot, sensors) if sensors else []
                 sends += wishes or [sessions.observe(robot, self._heeded(robot))]
         return sends
 
@@ -139,7 +139,7 @@ class Sensing:
         return min(self._due.values(), default=math.inf)
 
     def crossed(self, robot: str, value: m.SensorValue) -> SensorAlarm | None:
-        """Return the alarm that a value gives: once, until the sensor has shown less again."""
+        """Return the alarm that a value raises: once, until the value has been below it again."""
         alarm = self.alarms.get(value.sensor)
         if alarm is None:
             return None
@@ -155,8 +155,9 @@ class Sensing:
         return alarm if self._above[key] == VALUES_IN_A_ROW else None
 
     def times_alarm(self, robot: str, sensor: str) -> float:
-        """Return how many times its alarm level a sensor has shown lately; 0 where it is below."""
+        """Return a sensor's recent value as a multiple of its alarm level; 0 if below."""
         times = self._times.get((robot, sensor), ())
+        # The least of them, so that one noisy value cannot raise the severity.
         return min(times) if len(times) == VALUES_IN_A_ROW else 0.0
 
     def _heeded(self, robot: str) -> tuple[str, ...]:

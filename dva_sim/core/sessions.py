@@ -1,4 +1,4 @@
-"""Sessions as the DVA keeps them: who holds which robot, and who has to hear that it is over.
+"""Sessions of the DVA: who holds which robot, and which devices must be told when that ends.
 
 There is one holder at a time, whose session is a fencing token (`Permissions`).
 """
@@ -39,7 +39,7 @@ class DvaAnswer:
     sends: Sequence[Send] = ()
 
 
-MAX_UNACKNOWLEDGED = 1000
+MAX_UNACKNOWLEDGED = 1000  # maximum notices that robots have not acknowledged
 
 
 @dataclass
@@ -63,9 +63,9 @@ class Sessions:
     def grant(
         self, robot: m.Device, holder: m.Device, wish: m.PermissionRequest
     ) -> tuple[m.Permission, list[Send]] | None:
-        """Grant a robot; the permission, and messages to the robot if it is new.
+        """Grant a robot; return the permission, and any message to the robot.
 
-        None if it is held.
+        None if another device holds it.
         """
         grant, is_news = self.permissions.request(
             robot.id_tag, holder.id_tag, wish.level, wish.sensors, holder.address
@@ -81,17 +81,17 @@ class Sessions:
 
     def hold(self, robot: str) -> tuple[int, Send | None]:
         """Take a robot for the DVA; return the session, and any message to the robot."""
-        own = self.permissions.own
-        grant, is_news = self.permissions.request(robot, own, "missions")
+        dva = self.permissions.own
+        grant, is_news = self.permissions.request(robot, dva, "missions")
         assert grant is not None
-        notice = Send(robot, m.PermissionGrant(own, grant.level, grant.session), grant.session)
+        notice = Send(robot, m.PermissionGrant(dva, grant.level, grant.session), grant.session)
         return grant.session, notice if is_news else None
 
     def is_held(self, robot: str) -> bool:
         """Return True if a robot is held by somebody other than the DVA."""
         grant = self.permissions.grants.get(robot)
-        held = grant is not None and grant.holder != self.permissions.own
-        return held or robot in self.reserved
+        has_driver = grant is not None and grant.holder != self.permissions.own
+        return has_driver or robot in self.reserved
 
     def held(self, robot: str, holder: str | None, to_read: bool) -> Grant | None:
         """Return the permission of a device, or that of the current holder, if there is one.
@@ -107,11 +107,11 @@ class Sessions:
         return reads or (drives if drives is not None and holder in (None, drives.holder) else None)
 
     def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
-        """Read sensors of a robot by the DVA itself; return what to tell the robot."""
-        own = self.permissions.own
-        grant, _ = self.permissions.request(robot, own, "sensors", sensors)
+        """Let the DVA itself read sensors of a robot; return the message to the robot."""
+        dva = self.permissions.own
+        grant, _ = self.permissions.request(robot, dva, "sensors", sensors)
         assert grant is not None
-        notice = m.PermissionGrant(own, grant.level, grant.session, None, sensors)
+        notice = m.PermissionGrant(dva, grant.level, grant.session, None, sensors)
         return Send(robot, notice, grant.session)
 
     def observes(self, robot: str) -> int:
@@ -137,7 +137,7 @@ class Sessions:
         return True
 
     def take_back(self, holder: str, robot: str) -> None:
-        """End the right of a device to drive a robot, which it knows of."""
+        """End a device's right to drive a robot; the device itself need not be told."""
         for grant in self.permissions.release(holder, robot):
             self._tell(grant, holder_too=False)
 
@@ -195,18 +195,18 @@ class Sessions:
             self.changes += self.unacknowledged.pop(body.session, None) is not None
 
     def remind(self, is_there: Callable[[str], bool]) -> None:
-        """Tell the robots again that have not heard, as soon as they are there."""
+        """Repeat the notices that robots have missed, once those robots are heard again."""
         self._unheard = {s: send for s, send in self._unheard.items() if s in self.unacknowledged}
         heard = [s for s, send in self._unheard.items() if is_there(send.to)]
         self._over += [self._unheard.pop(session) for session in heard]
 
     def with_something_open(self) -> set[str]:
         """Return robots that somebody holds, or that must still hear that a session is over."""
-        held = {g.robot for g in self.permissions.all() if g.holder != self.permissions.own}
-        return held.union(send.to for send in self.unacknowledged.values())
+        robots = {g.robot for g in self.permissions.all() if g.holder != self.permissions.own}
+        return robots.union(send.to for send in self.unacknowledged.values())
 
     def forget(self, robot: str) -> None:
-        """Forget a robot: its holders hear that, and it, if it comes back."""
+        """End all sessions of a robot; tell its holders, and the robot if it comes back."""
         for grant in [g for g in self.permissions.all() if g.robot == robot]:
             self.revoke(grant)
 
@@ -216,6 +216,7 @@ class Sessions:
         self.unacknowledged[body.session] = Send(body.device, body)
         self._over.append(self.unacknowledged[body.session])
         if len(self.unacknowledged) > MAX_UNACKNOWLEDGED:
+            # The oldest goes: its robot is the least likely to be heard again.
             del self.unacknowledged[next(iter(self.unacknowledged))]
 
     def to_tell(self) -> list[Send]:
@@ -288,25 +289,28 @@ class Permissions:
         """Grant a robot that is free, or already the holder's.
 
         Returns:
-            The grant, or None if another holds the robot; and whether the robot has to be told:
-            of what it knows already, asked for once more, it has not.
+            The grant, or None if another device holds the robot; and whether the robot has to be
+            told, which it has not if the same grant is requested again.
         """
         only_sensors = level == "sensors"
-        held = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
-        if held is not None and held.holder not in (holder, self.own):
+        current = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
+        # The DVA's own hold yields to any device.
+        if current is not None and current.holder not in (holder, self.own):
             return None, False
-        if only_sensors and held is None and len(self.observers) >= MAX_OBSERVERS:
+        if only_sensors and current is None and len(self.observers) >= MAX_OBSERVERS:
             return None, False
         terms = holder, level, sensors
-        same = held is not None and (held.holder, held.level, held.sensors) == terms
-        session = held.session if held is not None and same else self._new_session(only_sensors)
+        same = current is not None and (current.holder, current.level, current.sensors) == terms
+        session = (
+            current.session if current is not None and same else self._new_session(only_sensors)
+        )
         grant = Grant(robot, holder, level, session, sensors=sensors, address=address)
-        self.changes += grant != held
+        self.changes += grant != current
         if only_sensors:
             self.observers[robot, holder] = grant
         else:
             self.grants[robot] = grant
-        return grant, grant != held
+        return grant, grant != current
 
     def renew(self, grant: Grant) -> Grant:
         """Return the same right with a session above all previous ones."""
@@ -315,7 +319,8 @@ class Permissions:
         return renewed
 
     def _new_session(self, only_sensors: bool) -> int:
-        """Return a new session: only the right to drive is fenced by its height."""
+        """Return a new session; only rights to drive are fenced, so only they raise the count."""
+        # The random bits below the count keep anybody from guessing a session.
         self.count += not only_sensors
         return self.count << LOW_BITS | self.draw()
 
@@ -338,11 +343,11 @@ class Permissions:
         _drop_session(self.observers, session)
 
     def release(self, holder: str, robot: str | None = None) -> list[Grant]:
-        """Take back the right to drive from `holder`: of one robot, or of all; what that was."""
+        """End and return the rights of `holder` to drive: of one robot, or of all."""
         return self._counted(_take(self.grants, holder, robot))
 
     def forget(self, holder: str, robot: str | None = None) -> list[Grant]:
-        """Remove a right to read sensors; what was removed."""
+        """End and return the rights of `holder` to read sensors: of one robot, or of all."""
         return self._counted(_take(self.observers, holder, robot))
 
     def _counted(self, taken: list[Grant]) -> list[Grant]:

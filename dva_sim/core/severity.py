@@ -1,7 +1,7 @@
 """Severity of events that moves by what the DVA learns: reports, sensors of robots, and findings.
 
-It only rises, and each step up has a reason that people can read. Who decides by an option of the
-scenario whether it moves at all: otherwise it is the highest that was reported.
+It only rises, and each rise has a reason that people can read. An option of the scenario decides
+whether it moves at all; otherwise it is the highest severity reported.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Gathers what is known at one moment for the policy that has to decide."""
+"""Builds the situation that a policy decides on: what is known at one moment."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import GUARD, OPERATOR, ROBOT
 
-CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
-SAME_PLACE = 3e-5  # a few metres [deg]
-LATE, SETTLED = 2.0, 180.0  # within twice its time and so long [s] who was sent to wait is there
+CONSIDERED = 1000  # maximum tasks of one decision, those detected longest ago
+SAME_PLACE = 3e-5  # positions nearer than this, a few metres, are the same [deg]
+LATE, SETTLED = 2.0, 180.0  # a move is given up after this many times its travel time plus [s]
 KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
 
 _place = operator.attrgetter("place")
@@ -60,7 +60,7 @@ class PolicyView:
 
 @dataclass
 class SituationBuilder:
-    """Knows who can go, what there is to do, and how far it is.
+    """Builder of situations: available responders, tasks, and travel times between them.
 
     Attributes:
         policy: Policy, which declares what it needs to see.
@@ -94,7 +94,7 @@ class SituationBuilder:
         """Return ids of guards and robots that could be sent somewhere now."""
         return self._team(now).idle()
 
-    # --- who is on the way to wait somewhere ---------------------------------------------
+    # --- moves to waiting places --------------------------------------------------------
 
     def sends_to_wait(self, guard: str, station: int, eta: float, now: float) -> None:
         """Note that a guard is on its way to a station; a very late one is given up."""
@@ -104,10 +104,10 @@ class SituationBuilder:
         """Forget a move: the guard goes elsewhere, did not take it, or has forgotten it."""
         self._bound_for.pop(guard, None)
 
-    # --- what there is to do, and who can ------------------------------------------------
+    # --- tasks and responders -----------------------------------------------------------
 
     def _tasks(self) -> list[Event]:
-        """Return events that somebody could do something about, detected longest ago first."""
+        """Return the events that need a responder, detected longest ago first."""
         events = self.orders.events
         rules = self.orders.rules
         if not (rules.containment or self.policy.preempts):
@@ -142,6 +142,7 @@ class SituationBuilder:
         entries = self._free(registry.located(GUARD), now)
         robots = self._free(registry.located(ROBOT), now)
         operators = self._hands(registry.of_type(OPERATOR), now) if robots else []
+        # A robot cannot be sent without an operator who has a hand free.
         if operators:
             entries += robots
         engaged: list[Event | None] = [None] * len(entries)
@@ -152,7 +153,7 @@ class SituationBuilder:
         return KnownTeam(entries, engaged, operators)
 
     def _free(self, entries: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
-        """Return those who may be given an order, in order of registration."""
+        """Return the devices that may be given an order, in order of registration."""
         is_held = self.orders.sessions.is_held
         engaged = self.orders.engaged
         is_stopped = self.orders.emergencies.holds
@@ -170,7 +171,7 @@ class SituationBuilder:
         return self._hands(self.orders.registry.of_type(OPERATOR), now)
 
     def _hands(self, operators: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
-        """Operators who may be given a robot, each as often as it may; the least busy first."""
+        """Return operators once for each robot they could still take; the least busy first."""
         span = self.orders.rules.operator_span
         count = self.orders.engaged.count
         hands = [
@@ -244,7 +245,9 @@ class SituationBuilder:
         ground = self.ground
         if not ground.stations:
             return None
-        starts = [replace(start, under_way=True) for start in team.starts()]  # there is no hurry
+        starts = [
+            replace(start, under_way=True) for start in team.starts()
+        ]  # a move to wait needs no mobilisation
         eta = self.travel(starts, [s.position for s in ground.stations])[1].T.copy()
         idle_guard = [
             start.kind == "guard" and engaged is None

@@ -8,9 +8,9 @@ the process nothing is lost; after a power failure the last moments may be. Whil
 written, to a full disk for example, no permission is given, and nothing is confirmed that would
 be lost.
 
-Times are kept on a clock of their own, which goes while a DVA runs and stands while none does: how
-long an event has waited must not hang on the clock on the wall, which may be an hour off by then,
-or on how long the DVA was down, which only that clock could tell.
+Times are kept on a clock of their own, which runs only while a DVA runs: how long an event has
+waited must not depend on the wall clock, which may be an hour off by then, or on how long the DVA
+was down, which only the wall clock could tell.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 FORMAT = 3
 OLDER = 1, 2  # times by the wall clock; without emergencies
 MICROSECONDS = 1e6
-OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
-KEEPS_TIME = 1.0  # how often it is written how late it is while events are open [s]
-WRITE_AHEAD_S = 0.1  # the core looks once a second: what is due soon is written now [s]
-IDLE = 10  # and so much more rarely while none is
-WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
+OPEN_WITHIN = 1.0  # maximum wait for another process's lock when the file is opened [s]
+KEEPS_TIME = 1.0  # interval at which the time is written while events are open [s]
+IDLE = 10  # factor on that interval while no event is open
+WRITE_AHEAD_S = 0.1  # the core calls once a second: what is due this soon is written now [s]
+WRITE_WITHIN_MS = 50  # maximum wait for the lock on each write, during which the DVA stands still
 _TABLES = f"""
 BEGIN IMMEDIATE;
 CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value INTEGER NOT NULL);
@@ -59,13 +59,13 @@ _PLAIN: tuple[str, ...] = (
 
 
 class Store:
-    """The file that a DVA writes down what it must not forget in.
+    """SQLite file with the state that a DVA keeps across restarts.
 
     Args:
         file: File; created if missing.
 
     Attributes:
-        past: Added to the DVA's time it gives the time that is kept [s].
+        past: Offset from the DVA's time to the time that is kept [s].
         keeps_time: Interval at which the time is written while events are open [s].
         between_writes: Callback before each statement that writes, and after the last; it may
             raise.
@@ -98,7 +98,7 @@ class Store:
             raise
 
     def _open(self) -> None:
-        """See that it is a memory; a file that is something else stays as it is.
+        """Check that the file is a DVA's memory; any other file stays as it is.
 
         Nothing is written to one of this format: the disk may be full when a DVA restarts.
         """
@@ -107,6 +107,7 @@ class Store:
             version = self._about("format") if tables else None
             is_ours = version in (None, *OLDER, FORMAT)
         except (sqlite3.OperationalError, ValueError) as error:
+            # A database without the table `about` is another program's, and sound.
             if "no such" not in str(error):
                 raise self._useless(error) from None
             version = None
@@ -117,6 +118,7 @@ class Store:
             raise ConfigError(f"is not a DVA's memory of format {FORMAT}", self._path)
         try:
             self._file.execute("PRAGMA journal_mode=WAL")
+            # With a write-ahead log only a power failure can undo a commit, not a kill.
             self._file.execute("PRAGMA synchronous=NORMAL")
             self._file.executescript(_TRY_LOCK if version == FORMAT else _TABLES)
             self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
@@ -127,7 +129,7 @@ class Store:
         return ConfigError(f"cannot be used as the DVA's memory: {error}", self._path)
 
     def close(self) -> None:
-        """Put the file away."""
+        """Close the file."""
         self._file.close()
 
     def copy(self) -> bytes:
@@ -137,10 +139,10 @@ class Store:
     # --- to the file -------------------------------------------------------------------
 
     def keep(self, dva: Dva, changed: Iterable[Event], now: float) -> str | None:
-        """Write down what has changed; return what went wrong, in words, or None.
+        """Write what has changed; return why that failed, in words, or None.
 
-        Failed writes are tried again with the next call. A permission that cannot is
-        withdrawn: the next life of the DVA would give the robot to somebody else.
+        Failed writes are retried with the next call. A permission that was not written is
+        withdrawn: the next life of the DVA could give the robot to somebody else.
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= dva.registry.changes()
@@ -152,6 +154,7 @@ class Store:
         sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
         lasting = dva.with_something_open()
         entries = dva.registry.entries
+        # A silent device is kept only while something of it is open: see `_of_entry`.
         self._devices |= {i: entries[i] for i in lasting ^ self._lasting if i in entries}
         try:
             self._file.execute("BEGIN IMMEDIATE")
@@ -185,12 +188,12 @@ class Store:
         Nobody has heard of it yet, so nobody has to hear that it is over.
         """
         sessions = dva.sessions
-        held = _held(dva)
-        unkept = [grant for session, grant in held.items() if not self.knows(session)]
+        grants = _held(dva)
+        unkept = [grant for session, grant in grants.items() if not self.knows(session)]
         for grant in unkept:
             sessions.permissions.end(grant.session)
         for session, before in self._held.items():
-            replaced = session not in held and session not in sessions.unacknowledged
+            replaced = session not in grants and session not in sessions.unacknowledged
             if replaced and any(_is_same_right(grant, before) for grant in unkept):
                 sessions.permissions.restore(before)
         self._held = _held(dva)
@@ -216,11 +219,11 @@ class Store:
         put(_PUT_DEVICE, devices)
         gone = self._devices.keys() - changed.keys()
         put("DELETE FROM devices WHERE id = ?", ((i,) for i in gone))
-        for table, held in sessions.items():
+        for table, rows_by_key in sessions.items():
             before = self._sessions[table]
-            gone = before.keys() - held.keys()
+            gone = before.keys() - rows_by_key.keys()
             put(f"DELETE FROM {table} WHERE {_KEYS[table]} = ?", ((s,) for s in gone))
-            new = held.items() - before.items()
+            new = rows_by_key.items() - before.items()
             put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
         count = dva.sessions.permissions.count
         asks = dva.dispatcher.questions.asks
@@ -248,6 +251,7 @@ class Store:
         return has_memory
 
     def _recall(self, dva: Dva, now: float) -> bool:
+        # The kept time goes on from the last write, as if the DVA had not been down.
         self.past = self._time() - now
         silent = set[str]()
         for id_tag, data, is_silent in self._file.execute(_DEVICES):
@@ -267,8 +271,10 @@ class Store:
                 dva.orders.engaged.begin(name, event)
         dva.events.total = sum(dva.events.counts.values())
         self._recall_sessions(dva, now)
+        # Older files do not say whether people are asked first: the configuration decides.
         if self._is_about("ask_first"):
             self._asks = dva.dispatcher.questions.asks = bool(self._about("ask_first"))
+        # Taken and dropped: what was just read need not be written again.
         dva.registry.changes()
         dva.events.changes()
         self._devices = dict.fromkeys(silent)  # is gone from the file with the next write
@@ -304,6 +310,7 @@ class Store:
             dva.emergencies.restore(robot, RobotStop(stopped_by, tick, now, now))
         self._session_changes, self._held = _session_changes(dva), _held(dva)
         self._lasting = dva.with_something_open()
+        # New sessions have to lie above all that robots have ever received.
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _is_about(self, name: str) -> bool:
@@ -316,7 +323,7 @@ class Store:
 
 
 _KEYS = {"grants": "session", "untold": "session", "stops": "robot"}
-# Renewed in its place: the order of registration is to last.
+# An update in place keeps the order of rows, which is that of registration.
 _PUT_DEVICE = """
 INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
 """
@@ -406,15 +413,15 @@ def _held(dva: Dva) -> dict[int, Grant]:
     return {grant.session: grant for grant in dva.sessions.permissions.all()}
 
 
-def _is_same_right(one: Grant, other: Grant) -> bool:
+def _is_same_right(grant: Grant, other: Grant) -> bool:
     """Return True if a robot cannot have both."""
-    if "sensors" in (one.level, other.level):
-        return (one.robot, one.holder, one.level) == (other.robot, other.holder, other.level)
-    return one.robot == other.robot
+    if "sensors" in (grant.level, other.level):
+        return (grant.robot, grant.holder, grant.level) == (other.robot, other.holder, other.level)
+    return grant.robot == other.robot
 
 
 def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
-    """Return valid sessions, ended ones of which robots have not heard, and stopped robots."""
+    """Return permissions, ends that robots have not acknowledged, and stopped robots."""
     grants = dva.sessions.permissions.all()
     unacknowledged = [(s, send.body) for s, send in dva.sessions.unacknowledged.items()]
     return {

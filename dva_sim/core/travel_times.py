@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """From where a responder would set out.
+    """Starting point of a responder.
 
     Attributes:
         device: Its id.
@@ -32,7 +32,7 @@ class Start:
 
 
 class Travel(Protocol):
-    """Given by the world: how far it is, and how long it would take."""
+    """Travel times and distances, provided by the world."""
 
     def __call__(
         self, starts: Sequence[Start], goals: Sequence[m.Position]
@@ -53,11 +53,11 @@ class WaitingPlace:
 
 @dataclass(frozen=True)
 class SiteKnowledge:
-    """Knowledge of the place that does not change.
+    """Knowledge of the site that does not change.
 
     Attributes:
-        preference: Place of each device on the list for events at a position, from 0;
-            infinite for who is not on it. None without such lists.
+        preference: Rank of each device on the list for events at a position, from 0;
+            infinite for a device that is not on it. None without such lists.
         stations: Waiting places for guards.
         reach: Travel time from each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`.

@@ -318,22 +318,22 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     def _seen(self) -> tuple[Observations, Info]:
         situation = self.situation
-        seen: Observations = {
+        observations: Observations = {
             name: np.zeros(box.shape or (), dtype=np.float32)
             for name, box in cast("spaces.Dict", self.observation_space).items()
             if name != "action_mask"
         }
-        seen["action_mask"] = self._mask.copy()
-        seen["time_s"][0] = self._running().now
+        observations["action_mask"] = self._mask.copy()
+        observations["time_s"][0] = self._running().now
         if situation is not None:
-            self._show(seen, situation)
-        return seen, {"action_mask": seen["action_mask"]}
+            self._show(observations, situation)
+        return observations, {"action_mask": observations["action_mask"]}
 
-    def _show(self, seen: Observations, situation: Situation) -> None:
+    def _show(self, observations: Observations, situation: Situation) -> None:
         now = situation.now
         tasks = situation.tasks[: self._tasks]
         for row, task in enumerate(tasks):
-            seen["tasks"][row] = (
+            observations["tasks"][row] = (
                 *(task.kind == kind for kind in EVENT_KINDS),
                 task.stage == "contain",
                 task.due,
@@ -344,21 +344,25 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                 task.engaged is not None,
             )
         for index, responder in zip(self._places, situation.responders, strict=True):
-            seen["units"][index] = 1.0, responder.kind == "robot", responder.engaged is not None
-        seen["operators"][0] = self._operators
+            observations["units"][index] = (
+                1.0,
+                responder.kind == "robot",
+                responder.engaged is not None,
+            )
+        observations["operators"][0] = self._operators
         rows = slice(len(tasks))
         for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):
-            seen[name][:] = NO_END
-            seen[name][rows, self._places] = _bounded(ways[rows])
+            observations[name][:] = NO_END
+            observations[name][rows, self._places] = _bounded(ways[rows])
         if self._auctions:
-            seen["bids_s"][:] = NO_END
-            seen["bids_s"][rows, self._places] = _bounded(situation.bids[rows])
+            observations["bids_s"][:] = NO_END
+            observations["bids_s"][rows, self._places] = _bounded(situation.bids[rows])
         if self._stations and situation.cover is not None:
-            seen["cover_s"][:] = NO_END
-            seen["cover_s"][self._places] = _bounded(situation.cover.eta)
+            observations["cover_s"][:] = NO_END
+            observations["cover_s"][self._places] = _bounded(situation.cover.eta)
             for index, bound in zip(self._places, situation.cover.bound_for, strict=True):
                 if bound is not None:
-                    seen["bound_for"][index, bound] = 1.0
+                    observations["bound_for"][index, bound] = 1.0
 
     def _reward(self) -> float:
         """Return minus the minutes that events have waited since this was asked last."""

@@ -92,8 +92,8 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         super().reset(seed=seed)
         drawn = int(self.np_random.integers(2**31)) if seed is None else seed
         self.drive = SteppedDrive(self.scenario, drawn)
-        seen = self.drive.begin().observation
-        points = self.drive.run.stage.planner.path((seen.x, seen.y), self.drive.goal)
+        observation = self.drive.begin().observation
+        points = self.drive.run.stage.planner.path((observation.x, observation.y), self.drive.goal)
         if points is None:
             raise ConfigError("there is no path from the robot to the event")
         self._route = Route(points)
@@ -109,23 +109,23 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         self._asked = _shares(action)
         outcome = drive.step(*self._asked, self.dt)
         before = self._left
-        seen = self._seen()
+        observation = self._seen()
         reward = (before - self._left) / drive.limits[0] - self.dt
         cut = not outcome and drive.now >= self.scenario.horizon_s
-        return seen, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}
+        return observation, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}
 
     def _seen(self) -> Vector:
         """Return the newest picture as an observation; the last one, where the drive is over."""
         drive = self.drive
         assert drive is not None
         if (frame := drive.frame) is not None:
-            seen = frame.observation
-            near = self._route.ahead(seen.x, seen.y, seen.heading, NEAR_M)
-            far = self._route.ahead(seen.x, seen.y, seen.heading, FAR_M)
+            observation = frame.observation
+            near = self._route.ahead(observation.x, observation.y, observation.heading, NEAR_M)
+            far = self._route.ahead(observation.x, observation.y, observation.heading, FAR_M)
             self._left = far.remaining
             age = drive.now - frame.captured
             pose = (far.remaining, near.offset, near.bearing, far.bearing)
-            self._shown = (*pose, seen.speed, seen.turn_rate, age)
+            self._shown = (*pose, observation.speed, observation.turn_rate, age)
         return np.clip(np.array([*self._shown, *self._asked], np.float32), -BOUND, BOUND)
 
 

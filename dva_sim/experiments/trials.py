@@ -108,17 +108,19 @@ def chosen_of(study: Study, results: Results) -> TunedValues:
     if not part.has(rule.measure):
         raise ConfigError(f"tuning.measure {rule.measure!r} has no value in any of these runs")
     whens = list(part.settings(but=[f.name for f in part.factors if f.name not in rule.by]))
-    seen = [_tried(part, rule, when, value) for when in whens for value in rule.levels]
+    trials = [_tried(part, rule, when, value) for when in whens for value in rule.levels]
     return TunedValues(
         study=study.file.stem,
         made_with=f"{__version__} {fingerprint()}",
         basis=basis_of_tuning(StudyInputs(study)),
         tuning=rule,
         chosen=tuple(
-            ChosenValue(when=when, value=choose({s.value: s.mean for s in seen if s.when == when}))
+            ChosenValue(
+                when=when, value=choose({s.value: s.mean for s in trials if s.when == when})
+            )
             for when in whens
         ),
-        seen=tuple(seen),
+        seen=tuple(trials),
     )
 
 

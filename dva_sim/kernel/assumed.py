@@ -88,8 +88,8 @@ def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> I
             whole = isinstance(default, int)
             value = getattr(default, "median", default)
             is_trait = hasattr(default, "median")
-            own = f"{key}.median" if is_trait and depth > 1 else key
-            yield Assumption(own, float(value), note.low, note.high, note.why, whole)
+            key_of_median = f"{key}.median" if is_trait and depth > 1 else key
+            yield Assumption(key_of_median, float(value), note.low, note.high, note.why, whole)
 
 
 class OmitsUnset(Config):

@@ -90,8 +90,8 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
     keys = keys_meant(path, value, *models)
     if keys:
         unit = keys[0].rpartition("_")[2]
-        other = str(path[-1]).rpartition("_")[2]
-        text = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
+        unit_written = str(path[-1]).rpartition("_")[2]
+        text = f" (in {_UNITS[unit]})" if unit in _UNITS and unit_written != unit else ""
         return f"did you mean {either(map(repr, keys))}?{text}"
     here = fields_at(models[0], path[:-1])
     return f"known here: {listed(sorted(here), most=24)}" if here else ""
@@ -229,8 +229,8 @@ def first_mistake(
             for each, path in zip(errors, paths, strict=True)
             if each["type"] == "missing" and each["loc"][:-1] == errors[0]["loc"][:-1]
         ]
-        *others, last = map(repr, beside)
-        text = f"missing keys {', '.join(others)} and {last}" if others else f"missing key {last}"
+        *first, last = map(repr, beside)
+        text = f"missing keys {', '.join(first)} and {last}" if first else f"missing key {last}"
         return text, paths[0]
     reports = [e for e, path in zip(errors, paths, strict=True) if path == paths[0]]
     return _explain(model, reports, paths[0]), paths[0]

@@ -91,12 +91,14 @@ class Plugins(Generic[T]):
             ConfigError: as `find`; a bad option is reported when it is made, as by `make`.
         """
         factory = self.find(name, base)
-        own = dict(options or {})
+        kept_options = dict(options or {})
         word = word_of(name)
         finish = None if factory in self.shipped.values() else self.finish
 
         def made(*arguments: Any) -> T:
-            options_of_one = copy.deepcopy(own)  # what it does to them, the next does not see
+            options_of_one = copy.deepcopy(
+                kept_options
+            )  # what it does to them, the next does not see
             one = self.make(word, factory, options_of_one, *arguments)
             return one if finish is None else self.ask(word, partial(finish, one))
 
@@ -243,10 +245,10 @@ class Guard:
     def _answer(self, ask: Callable[..., Any], *arguments: Any) -> tuple[float, float] | None:
         """Return two finite numbers, or None."""
         try:
-            one, other = ask(*arguments)
-            if math.isfinite(one) and math.isfinite(other):
-                return float(one), float(other)
-            self._count(f"answers {one!r}, {other!r}")
+            first, second = ask(*arguments)
+            if math.isfinite(first) and math.isfinite(second):
+                return float(first), float(second)
+            self._count(f"answers {first!r}, {second!r}")
         except FAILURES as error:
             self._count(error_text(error))
         return None

@@ -96,30 +96,30 @@ def find(
     raise ConfigError(_missing(name, folder, sorted(available(folder, f"*{suffix}")), is_asked))
 
 
-def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
+def _missing(name: str, folder: str, names: list[str], is_asked: bool) -> str:
     """Describe a missing file: what else has its name, what was meant, or what there is."""
     kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
     path = Path(name)
-    others = {where: k for where, k in KINDS.items() if where != folder}
+    other_kinds = {where: k for where, k in KINDS.items() if where != folder}
     if name and _is_there(path.is_dir):
         if is_file(path / _RESULTS):
             return f"{name!r} is a results folder, not a {kind}; try: dva-sim show {path}"
         return f"{name!r} is a folder; give the file of a {kind}, or its name"
-    for where, other in others.items():
+    for where, other_kind in other_kinds.items():
         if is_there(name, where):
-            use = f"; try: {other.command} {name}" if other.command and is_asked else ""
-            return f"{name!r} is a {other.word}, not a {kind}{use}"
+            use = f"; try: {other_kind.command} {name}" if other_kind.command and is_asked else ""
+            return f"{name!r} is a {other_kind.word}, not a {kind}{use}"
     if path.suffix or len(path.parts) > 1:
-        return f"file {name!r} not found{_meant(path, kind, known)}"
-    for where, other in others.items() if not guess(name, known) else ():
+        return f"file {name!r} not found{_meant(path, kind, names)}"
+    for where, other_kind in other_kinds.items() if not guess(name, names) else ():
         near = guess(name, available(where))
-        if near is not None and other.command:
-            use = f" Try: {other.command} {near}" if is_asked else ""
-            return f"{kind} {name!r} not found; did you mean the {other.word} {near!r}?{use}"
-    return f"{kind} {name!r} not found; {hint(path.stem, known, 'available')}"
+        if near is not None and other_kind.command:
+            use = f" Try: {other_kind.command} {near}" if is_asked else ""
+            return f"{kind} {name!r} not found; did you mean the {other_kind.word} {near!r}?{use}"
+    return f"{kind} {name!r} not found; {hint(path.stem, names, 'available')}"
 
 
-def _meant(path: Path, kind: str, known: list[str]) -> str:
+def _meant(path: Path, kind: str, names: list[str]) -> str:
     """Return a hint at the file or name that was probably meant; empty without one."""
     try:
         beside = sorted(each.name for each in path.parent.iterdir() if each.suffix in _TEXTS)
@@ -130,7 +130,7 @@ def _meant(path: Path, kind: str, known: list[str]) -> str:
     near = path.stem if path.stem in stems else guess(path.stem, stems)
     if near is not None:
         return f"; did you mean {str(path.parent / stems[near])!r}?"
-    return f"; did you mean the {kind} {path.stem!r}?" if path.stem in known else ""
+    return f"; did you mean the {kind} {path.stem!r}?" if path.stem in names else ""
 
 
 def refuse_to_replace(

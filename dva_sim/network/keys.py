@@ -66,24 +66,24 @@ class KeyRing:
             The devices whose key is gone, new or another.
         """
         try:
-            seen = self._look()
+            versions = self._look()
         except ConfigError:
             return set()
-        if seen == self._seen:
+        if versions == self._seen:
             return set()
         before = self._public
         files = dict[Path, tuple[str, bytes]]()
-        for file in sorted(seen):
+        for file in sorted(versions):
             key = self._files.get(file)
-            if key is None or seen[file] != self._seen.get(file):
+            if key is None or versions[file] != self._seen.get(file):
                 try:
                     key = _read_public(file)
                 except ConfigError:
-                    del seen[file]
+                    del versions[file]
             if key is not None:
                 files[file] = key
         self._files = files
-        self._seen = seen
+        self._seen = versions
         self._public = {}
         self._owners = {}
         for file in files:

@@ -244,8 +244,8 @@ class Requester:
         request.attempts += 1
         if len(self._deadlines) > MAX_ANSWERED + 2 * len(self._open):
             # The first stays, as its event is on its way.
-            first, *others = self._deadlines
-            self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])
+            first, *later = self._deadlines
+            self._deadlines = deque([first, *(each for each in later if each[1] in self._open)])
         self._deadlines.append((self._clock.now + self.timeout, request.tag, request.attempts))
         if len(self._deadlines) == 1:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)

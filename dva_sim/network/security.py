@@ -330,8 +330,8 @@ class Security:
 
     def trouble(self, device: str, peer: str) -> str | None:
         """Return what keeps a device from its peer now, for the message after a time-out."""
-        for (one, _, _), handshake in self._handshakes.get(peer, {}).items():
-            if one == device and handshake.latest is not None:
+        for (client, _, _), handshake in self._handshakes.get(peer, {}).items():
+            if client == device and handshake.latest is not None:
                 return str(handshake.latest)
         return None
 

@@ -596,7 +596,7 @@ class SocketNetwork(RealNetwork):
     def _retry(self, node: str, peer: str) -> None:
         if self._security.trouble(node, peer) is None:
             return
-        for socket in [s for s, one in self._clients.get(peer, {}).items() if one == node]:
+        for socket in [s for s, owner in self._clients.get(peer, {}).items() if owner == node]:
             socket.connect(cut(socket))
             self.clock.look(socket)
         self.clock.call_after(RETRY, self._retry, node, peer)

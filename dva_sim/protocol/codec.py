@@ -89,8 +89,8 @@ def _simple(payload: str, kind: str = "SimpleMsg") -> str:
 
 
 def _set_teleop(groups: _Groups) -> m.SetTeleOp | None:
-    speed, turn_rate, seen = groups
-    tick = int(seen) if seen else None
+    speed, turn_rate, frame = groups
+    tick = int(frame) if frame else None
     if tick and tick > MAX_TICK:
         return None
     return m.make_set_tele_op(float(speed), float(turn_rate), tick)

@@ -49,9 +49,9 @@ class Outbox:
     def message(self, destination: str, body: Body, now: float, session: int = 0) -> Message:
         """Return a message that is newer than all before it."""
         self._last_id += 1
-        held = None if isinstance(body, Heartbeat) else session
+        session_id = None if isinstance(body, Heartbeat) else session
         stamp = timestamp(self._start + now, self._exact)
-        return make_message(destination, self._last_id, self.source, stamp, held, body)
+        return make_message(destination, self._last_id, self.source, stamp, session_id, body)
 
     def encode(self, destination: str, body: Body, now: float, session: int = 0) -> bytes:
         """Serialise a new message."""

@@ -32,8 +32,8 @@ def form_of(element: str) -> str | None:
 
 def _in_words(limits_of_type: dict[str, list[str]]) -> str:
     if "enumeration" in limits_of_type:
-        *others, last = limits_of_type["enumeration"]
-        return f"one of {', '.join(others)} or {last}" if others else last
+        *values, last = limits_of_type["enumeration"]
+        return f"one of {', '.join(values)} or {last}" if values else last
     base = limits_of_type["base"][0]
     if base in WHOLE or "minInclusive" in limits_of_type:
         low = limits_of_type.get("minInclusive", ["0"])[0]

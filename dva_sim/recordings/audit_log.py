@@ -283,9 +283,11 @@ def _followed(file: sqlite3.Connection) -> Verified:
         number += 1
         head = values[-1]
         last = values[COLUMNS.index("action")]
-    (given,) = next(file.execute("SELECT max(seq) FROM sqlite_sequence WHERE name = 'audit'"), (0,))
-    if (given or 0) > number:
-        lost = f"is missing: rows up to {given} were written, and the end was cut"
+    (highest,) = next(
+        file.execute("SELECT max(seq) FROM sqlite_sequence WHERE name = 'audit'"), (0,)
+    )
+    if (highest or 0) > number:
+        lost = f"is missing: rows up to {highest} were written, and the end was cut"
         return Verified(number, head, FirstWrong(number + 1, lost))
     return Verified(number, head, None, last == END, tuple(_doubts(file, last)))
 

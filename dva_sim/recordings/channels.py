@@ -94,8 +94,8 @@ def active(time: float, name: str, mode: str) -> ChannelMessage:
 def beliefs(playback: Playback) -> Iterator[ChannelMessage]:
     """Yield where operators believe the robots they drive to be."""
     for robot, views in playback.recorder.views.items():
-        for seen in views:
-            yield _pose(playback.labels[robot], SEEN, seen)
+        for view in views:
+            yield _pose(playback.labels[robot], SEEN, view)
 
 
 def fixes(playback: Playback) -> Iterator[ChannelMessage]:
@@ -405,8 +405,10 @@ def fact_message(fact: Fact) -> ChannelMessage:
 def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
     """Return the fact that a message of `facts` holds."""
     names = {written: name for name, written in _IN_SECONDS.items()}
-    held = {names.get(name, name): value for name, value in content.items() if name != "timestamp"}
-    return Fact(time=time, **held)
+    values = {
+        names.get(name, name): value for name, value in content.items() if name != "timestamp"
+    }
+    return Fact(time=time, **values)
 
 
 _IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waited")}
@@ -433,9 +435,10 @@ def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
     """Return a message as it went onto the network; of a frame, what it stands for."""
     if isinstance(sent.payload, CameraFrame):
         frame = sent.payload
-        seen = frame.observation
+        observation = frame.observation
         hazards = [
-            {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards
+            {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)}
+            for h in observation.hazards
         ]
         return stamped(
             sent.time,
@@ -444,11 +447,11 @@ def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
             to=names[sent.destination],
             size_bytes=sent.size,
             captured_s=frame.captured,
-            tick_ms=seen.tick,
-            x_m=round(seen.x, messages.PLACES),
-            y_m=round(seen.y, messages.PLACES),
-            heading_rad=round(seen.heading, messages.PLACES),
-            visibility_m=round(seen.visibility, 2),
+            tick_ms=observation.tick,
+            x_m=round(observation.x, messages.PLACES),
+            y_m=round(observation.y, messages.PLACES),
+            heading_rad=round(observation.heading, messages.PLACES),
+            visibility_m=round(observation.visibility, 2),
             hazards=hazards,
         )
     topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"

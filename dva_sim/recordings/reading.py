@@ -91,15 +91,15 @@ def recorded_hazard(number: int, entry: Mapping[str, Any], records: Records) -> 
         colour: ClassVar[str] = entry["described"]["colour"]
         mark: ClassVar[str] = entry["described"]["mark"]
 
-    own = [(time, state) for time, state in records if state["number"] == number]
+    states = [(time, state) for time, state in records if state["number"] == number]
     keys = "radius_m", "danger_radius_m", "severity"
     position = entry["hazard"]["position"]
     start = entry["hazard"]["start"]
     return AsRecorded(
         position=tuple(position),
         start=start,
-        times=tuple(time for time, _ in own),
-        sizes=tuple(tuple(state[key] for key in keys) for _, state in own),
+        times=tuple(time for time, _ in states),
+        sizes=tuple(tuple(state[key] for key in keys) for _, state in states),
     )
 
 
@@ -223,7 +223,10 @@ def _opened(raw: RawRecords) -> Opened:
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
         events=[_event(entry) for entry in run.get("events", [])],
-        facts=[channels.fact_of(time, held) for time, held in raw.contents.get(channels.FACTS, ())],
+        facts=[
+            channels.fact_of(time, content)
+            for time, content in raw.contents.get(channels.FACTS, ())
+        ],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
@@ -337,9 +340,9 @@ def _recorder(raw: RawRecords, run: Mapping[str, Any]) -> Recorder:
             recorder.tracks[name] = _track(raw.contents[topic], modes, run["sampled_s"], end)
     robots = {run["labels"][robot]: robot for robot in run["radii_m"]}
     for name, robot in robots.items():
-        seen = raw.contents.get(f"/{name}/{channels.SEEN}")
-        if seen:
-            recorder.views[robot] = [_point(time, content, "seen") for time, content in seen]
+        views = raw.contents.get(f"/{name}/{channels.SEEN}")
+        if views:
+            recorder.views[robot] = [_point(time, content, "seen") for time, content in views]
     recorder.traffic = sorted(_traffic(raw, run), key=lambda sent: sent.time)
     recorder.drives = _drives(raw, run)
     return recorder

@@ -173,7 +173,7 @@ def _metre_of(
     usual = median(math.hypot(*xyz) for xyz in axes) if axes else 0.0
     units: dict[Unit, float] = {"m/s2": GRAVITY, "g": 1.0}
     around = _AROUND_GRAVITY if unit is None else _AROUND_NAMED_GRAVITY
-    near = (u for u, one in units.items() if abs(usual / one - 1) < around)
+    near = (u for u, metre in units.items() if abs(usual / metre - 1) < around)
     fitting = next((u for u in near if unit in (None, u)), None)
     if fitting is None:
         text = f"acceleration is {usual:.3g} in the median, gravity would be 9.81 m/s^2 or 1 g"

@@ -144,13 +144,13 @@ class RosDriver:
 
     def _take(self, robot: str, on_result: OnResult, tries: int) -> None:
         def taken(done: bool, text: str) -> None:
-            held = self._person.robots.get(robot)
-            if not done or held is None:
+            control = self._person.robots.get(robot)
+            if not done or control is None:
                 on_result(False, text)
-            elif held.is_driven:
+            elif control.is_driven:
                 on_result(True, text)
             else:
-                held.start(begun)
+                control.start(begun)
 
         def begun(done: bool, text: str) -> None:
             if done:
@@ -159,9 +159,9 @@ class RosDriver:
                 self.device.clock.call_after(0.0, not_begun, text)
 
         def not_begun(text: str) -> None:
-            held = self._person.robots.get(robot)
-            if held is not None:
-                held.give_back()
+            control = self._person.robots.get(robot)
+            if control is not None:
+                control.give_back()
                 on_result(False, text)
             elif tries > 1 and robot in self._wanted:
                 # The permission ran out while connections were made over a long link.
@@ -176,11 +176,11 @@ class RosDriver:
     def release(self, robot: str, on_result: OnResult) -> None:
         """Stop a robot, and give it back."""
         self._wanted.discard(robot)
-        held = self._person.robots.get(robot)
-        if held is None:
+        control = self._person.robots.get(robot)
+        if control is None:
             on_result(False, "it is not yours")
             return
-        held.give_back()
+        control.give_back()
         on_result(True, "given back")
 
     @property
@@ -195,23 +195,23 @@ class RosDriver:
 
     def drive(self, robot: str, speed: float, turn_rate: float) -> str:
         """Command a speed [m/s] and a turn rate [rad/s]; return why not, or an empty text."""
-        held = self._person.robots.get(robot)
-        if held is None or not held.is_driven:
+        control = self._person.robots.get(robot)
+        if control is None or not control.is_driven:
             why = self._person.alert
             return f"it is not yours{f' ({why})' if why else ''}: call take_control first"
         reach = self._person.console.reach(robot)
         self._number += 1
-        held.want(self._number, max(0.0, speed) / reach.speed, turn_rate / reach.turn_rate)
+        control.want(self._number, max(0.0, speed) / reach.speed, turn_rate / reach.turn_rate)
         self._newest[robot] = self._number
         self.device.clock.call_after(SILENT, self._fell_silent, robot, self._number)
         return ""
 
     def _fell_silent(self, robot: str, number: int) -> None:
         """Let a robot stand if no command came after one."""
-        held = self._person.robots.get(robot)
-        if self._newest.get(robot) == number and held is not None and held.is_driven:
+        control = self._person.robots.get(robot)
+        if self._newest.get(robot) == number and control is not None and control.is_driven:
             self._number += 1
-            held.want(self._number, 0.0, 0.0)
+            control.want(self._number, 0.0, 0.0)
 
 
 class RosGateway:

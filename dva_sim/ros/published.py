@@ -43,10 +43,16 @@ def _vector(x: float, y: float = 0.0, z: float = 0.0) -> Json:
     return {"x": x, "y": y, "z": z}
 
 
-def odometry(name: str, seen: Observation, captured: float) -> Json:
+def odometry(name: str, observation: Observation, captured: float) -> Json:
     """Return nav_msgs/Odometry of a robot, by one of its frames."""
-    pose = {"position": _vector(seen.x, seen.y), "orientation": _turned(seen.heading)}
-    twist = {"linear": _vector(seen.speed), "angular": _vector(0.0, 0.0, seen.turn_rate)}
+    pose = {
+        "position": _vector(observation.x, observation.y),
+        "orientation": _turned(observation.heading),
+    }
+    twist = {
+        "linear": _vector(observation.speed),
+        "angular": _vector(0.0, 0.0, observation.turn_rate),
+    }
     return {
         "header": _header(captured, MAP),
         "child_frame_id": f"{name}/base_link",
@@ -55,7 +61,7 @@ def odometry(name: str, seen: Observation, captured: float) -> Json:
     }
 
 
-def transform(name: str, seen: Observation, captured: float) -> Json:
+def transform(name: str, observation: Observation, captured: float) -> Json:
     """Return tf2_msgs/TFMessage with one robot, by one of its frames."""
     return {
         "transforms": [
@@ -63,8 +69,8 @@ def transform(name: str, seen: Observation, captured: float) -> Json:
                 "header": _header(captured, MAP),
                 "child_frame_id": f"{name}/base_link",
                 "transform": {
-                    "translation": _vector(seen.x, seen.y),
-                    "rotation": _turned(seen.heading),
+                    "translation": _vector(observation.x, observation.y),
+                    "rotation": _turned(observation.heading),
                 },
             }
         ]

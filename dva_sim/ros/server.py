@@ -211,17 +211,19 @@ class RosbridgeServer:
 
     def topics(self) -> dict[str, str]:
         """Return all topics with their types."""
-        own = {
+        of_robots = {
             f"/{name}/{topic}": kind
             for name in self._gateway.robots
             for topic, kind in TYPES.items()
         }
-        return own | SHARED
+        return of_robots | SHARED
 
     def services(self) -> dict[str, str]:
         """Return all services with their types."""
-        own = {f"/{name}/{word}": TRIGGER for name in self._gateway.robots for word in CONTROL}
-        return own | ROSAPI
+        of_robots = {
+            f"/{name}/{word}": TRIGGER for name in self._gateway.robots for word in CONTROL
+        }
+        return of_robots | ROSAPI
 
     def type_of(self, topic: str) -> str | None:
         """Return the message type of a topic; for a robot that may still come, its future type."""
@@ -256,10 +258,10 @@ class RosbridgeServer:
 
     def _on_frame(self, robot: KnownRobot, frame: CameraFrame) -> None:
         name = robot.name
-        seen = frame.observation
+        observation = frame.observation
         at = frame.captured
-        self._send(f"/{name}/odom", lambda: published.odometry(name, seen, at))
-        self._send("/tf", lambda: published.transform(name, seen, at))
+        self._send(f"/{name}/odom", lambda: published.odometry(name, observation, at))
+        self._send("/tf", lambda: published.transform(name, observation, at))
 
     def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
         name = robot.name

@@ -26,8 +26,8 @@ class HttpProtocol(H11Protocol):
     noticed, and a connection with a token known. So both are handed through a request's scope.
 
     Args:
-        place: Its place.
-        given: See `H11Protocol`.
+        slot: Connection slot that the port counts.
+        **options: See `H11Protocol`.
 
     Attributes:
         is_made: True once the connection belongs to the protocol, and no longer to the listener.

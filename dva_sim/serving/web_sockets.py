@@ -21,8 +21,8 @@ class WireProtocol(WebSocketsSansIOProtocol):
     """A WebSocket that the application can drop.
 
     Args:
-        place: Place of its connection.
-        given: See `WebSocketsSansIOProtocol`.
+        slot: Connection slot that the port counts.
+        **options: See `WebSocketsSansIOProtocol`.
     """
 
     def __init__(self, slot: PortConnection, **options: Any) -> None:
@@ -31,7 +31,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self.app = extended(self.app, {PLACE: slot, WIRE: self})
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Release the place of the connection."""
+        """Release the connection slot."""
         super().connection_lost(exc)
         self._place.leave()
 

@@ -112,8 +112,8 @@ def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
 def measure_called(name: str, model: str = "") -> Measure:
     """Return the description of a measure, in a certain model if it has it; else its name."""
     columns = MODELS[model].columns["runs"] if model in MODELS else ()
-    own = next((column for column in columns if column.name == name), None)
-    return own or _measures().get(name) or _OWN_COLUMNS.get(name) or Measure(name, "")
+    column_measure = next((column for column in columns if column.name == name), None)
+    return column_measure or _measures().get(name) or _OWN_COLUMNS.get(name) or Measure(name, "")
 
 
 def factor_name(factor: str) -> str:
@@ -198,5 +198,5 @@ def setting(levels: Mapping[str, Scalar]) -> str:
 def named(factor: str, level: Scalar) -> str:
     """Return a level behind its factor's name, unless its own has that: `direct control`."""
     name = factor_name(factor)
-    own = level_name(factor, level)
-    return own if name in own.split() else f"{name} {own}"
+    text = level_name(factor, level)
+    return text if name in text.split() else f"{name} {text}"

@@ -95,10 +95,10 @@ class Model(Generic[S]):
         """
         recording = self.simulate(scenario, seed)
         tables = self.rows(recording, with_tracks)
-        own = values_of(measures, recording, scenario.model)
-        if twins := tables["runs"][0].keys() & own.keys():
+        values = values_of(measures, recording, scenario.model)
+        if twins := tables["runs"][0].keys() & values.keys():
             raise ConfigError(f"the model {scenario.model!r} has a column {min(twins)!r} itself")
-        tables["runs"][0] |= own
+        tables["runs"][0] |= values
         return tables
 
     def rehearse(self, scenario: S, seed: int) -> None:
@@ -261,8 +261,8 @@ def model_of(document: Document) -> Model[Any]:
     name = document.data.get("model", "full")
     if isinstance(name, str) and name in MODELS:
         return MODELS[name]
-    own = use_now("model", "FILE:CLASS") if ".py:" in str(name) else ""
-    raise document.error(own or unknown("model", name, MODELS), ("model",))
+    advice = use_now("model", "FILE:CLASS") if ".py:" in str(name) else ""
+    raise document.error(advice or unknown("model", name, MODELS), ("model",))
 
 
 def model_for(scenario: AnyScenario) -> Model[Any]:

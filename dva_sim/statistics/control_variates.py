@@ -57,17 +57,17 @@ def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
     design = np.column_stack([np.ones(n), covariates])
     inverse = np.linalg.pinv(design, rcond=_DISTINCT)
     residual = values - design @ (inverse @ values)
-    own = np.einsum("ij,ji->i", design, inverse)  # how much of each fitted value is its own
-    if (own > 1 - _DISTINCT).any():
+    leverage = np.einsum("ij,ji->i", design, inverse)  # how much of each fitted value is its own
+    if (leverage > 1 - _DISTINCT).any():
         return values
     constant = float((inverse @ values)[0])
-    return np.asarray(constant + (n - 1) * inverse[0] * residual / (1 - own))
+    return np.asarray(constant + (n - 1) * inverse[0] * residual / (1 - leverage))
 
 
 def off_zero(covariate: ArrayLike) -> float:
     """Return how many standard errors the mean of a covariate `(n,)` is off its true zero."""
-    seen = np.asarray(covariate, dtype=float)
-    seen = seen[np.isfinite(seen)]
-    if len(seen) < 2 or not np.ptp(seen) > 0:
-        return 0.0 if not seen.any() else np.inf
-    return float(abs(seen.mean()) / (seen.std(ddof=1) / np.sqrt(len(seen))))
+    values = np.asarray(covariate, dtype=float)
+    values = values[np.isfinite(values)]
+    if len(values) < 2 or not np.ptp(values) > 0:
+        return 0.0 if not values.any() else np.inf
+    return float(abs(values.mean()) / (values.std(ddof=1) / np.sqrt(len(values))))

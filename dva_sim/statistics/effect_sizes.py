@@ -260,8 +260,8 @@ def _studentised(
         Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
     """
     n = len(first)
-    one, two, off = (x - x.mean() for x in (first, second, first - second))
-    rows = np.stack([np.ones(len(first)), one, two, one**2, two**2, off**2])
+    a, b, off = (x - x.mean() for x in (first, second, first - second))
+    rows = np.stack([np.ones(len(first)), a, b, a**2, b**2, off**2])
     shift = float((first - second).mean())
     whole, drawn = (
         _Drawn(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))

@@ -164,7 +164,7 @@ def cumulative_incidence(
     persons, owner = np.unique(person_of_row, return_inverse=True)
     codes = {name: number for number, name in enumerate(names, 1)}
     causes_met = np.array([codes.get(name, CUT) for name in what], dtype=np.intp)
-    left_out = [owner != one for one in range(len(persons))]
+    left_out = [owner != excluded for excluded in range(len(persons))]
     shares = np.transpose(
         [
             _shares(moments[chosen], causes_met[chosen], len(names), horizon)

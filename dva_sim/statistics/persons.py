@@ -65,8 +65,8 @@ def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats,
     first = np.asarray(a, dtype=float)
     second = np.asarray(b, dtype=float)
     both = np.isfinite(first) & np.isfinite(second)
-    one = person_means(np.where(both, first, np.nan), person)[1]
-    return one, person_means(np.where(both, second, np.nan), person)[1]
+    means = person_means(np.where(both, first, np.nan), person)[1]
+    return means, person_means(np.where(both, second, np.nan), person)[1]
 
 
 def students_t(level: float, n: int) -> float:

@@ -46,9 +46,9 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
     if math.isnan(n):
         return Interval(share, math.nan, math.nan, persons)
     beyond = (1 - LEVEL) / 2
-    seen = share * n
-    low = special.betaincinv(seen, n - seen + 1, beyond) if share > 0 else 0.0
-    high = special.betaincinv(seen + 1, n - seen, 1 - beyond) if share < 1 else 1.0
+    successes = share * n
+    low = special.betaincinv(successes, n - successes + 1, beyond) if share > 0 else 0.0
+    high = special.betaincinv(successes + 1, n - successes, 1 - beyond) if share < 1 else 1.0
     return Interval(share, float(low), float(high), persons)
 
 
@@ -113,8 +113,8 @@ def _is_compatible(share: Floats, n: float, q: float) -> NDArray[np.bool_]:
     from scipy import special
 
     beyond = (1 - LEVEL) / 2
-    seen = share * n
+    successes = share * n
     with np.errstate(invalid="ignore"):
-        is_below = special.betainc(seen, n - seen + 1, q) <= beyond
-        is_above = special.betainc(seen + 1, n - seen, q) >= 1 - beyond
+        is_below = special.betainc(successes, n - successes + 1, q) <= beyond
+        is_above = special.betainc(successes + 1, n - successes, q) >= 1 - beyond
     return np.asarray(~((share > 0) & is_below) & ~((share < 1) & is_above), dtype=bool)

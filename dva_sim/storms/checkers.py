@@ -114,7 +114,7 @@ BOUNDS: Final[dict[str, int]] = {
     "DvaAgent._last_reported": 20_000,
     "ReplyCache._replies": 64 * 1024,
     "_Kept.keys": 64,
-    "FairQueue._lines[]": 1_000,
+    "FairQueue._queues[]": 1_000,
     "Trail._facts": 10_000,
     "Store._events": 10_000,
 }
@@ -131,14 +131,14 @@ _SHARED: Final = tuple(
 
 def waiting_of(inbox: CommandQueue, peer: str) -> int:
     """Return how many messages of one connection wait in a robot's queue."""
-    lines = inbox._waiting._lines.items()
-    return sum(len(line) for (whose, _), line in lines if whose == peer)
+    queues = inbox._waiting._queues.items()
+    return sum(len(queue) for (whose, _), queue in queues if whose == peer)
 
 
 def is_waiting(inbox: CommandQueue, data: bytes) -> bool:
     """Return True for a message that is in a robot's queue."""
-    lines = inbox._waiting._lines.values()
-    return any(letter.data == data for line in lines for letter in line)
+    queues = inbox._waiting._queues.values()
+    return any(letter.data == data for queue in queues for letter in queue)
 
 
 def oversized(

@@ -248,8 +248,8 @@ class BusyDriver:
 
     def _give_back(self) -> None:
         if self._robot:
-            held = m.PermissionRevocation(self._robot, self.device.id_tag, self._session)
-            give_back(self.device, held)
+            revocation = m.PermissionRevocation(self._robot, self.device.id_tag, self._session)
+            give_back(self.device, revocation)
         self._forget()
 
     def _forget(self) -> None:

@@ -89,19 +89,19 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
 def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """Return a process that is stopped: what comes and goes waits, and is there all at once."""
     node = storm.id_of(fault.target)
-    held = list[i.PassingMessage]()
+    messages = list[i.PassingMessage]()
     interference = storm.interference
 
     def meets(passing: i.PassingMessage) -> bool:
         if node not in (passing.source, passing.to):
             return False
-        held.append(passing)
+        messages.append(passing)
         interference.counts[fault.kind] += 1
         return True
 
     def ends() -> None:
         interference.rules.remove(meets)
-        for passing in held:
+        for passing in messages:
             interference.deliver(passing)
 
     interference.rules.append(meets)
@@ -407,8 +407,8 @@ def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     dva = storm.run.dva
     if dva.is_gone:  # nobody is given anything by the dead
         return
-    others = [device for device in storm.labelled if device.startswith(DRIVERS)]
-    taker = storm.device(chance.choice(sorted(others)))
+    drivers = [device for device in storm.labelled if device.startswith(DRIVERS)]
+    taker = storm.device(chance.choice(sorted(drivers)))
     dva.revoke(robot, taker.id_tag, chance.random() < 0.5)
     grant = dva.core.sessions.permissions.grants.get(robot)
     if grant is None or grant.holder != taker.id_tag:
@@ -436,8 +436,8 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     def answered(reply: m.Reply) -> None:
         if isinstance(reply.content, m.Permission):
             session = reply.content.session
-            held = m.PermissionRevocation(robot.id, device.id_tag, session)
-            give_back(device, held, GIVEN_BACK)
+            revocation = m.PermissionRevocation(robot.id, device.id_tag, session)
+            give_back(device, revocation, GIVEN_BACK)
 
     for _ in range(max(1, round(fault.value))):
         device.ask(DVA, m.PermissionRequest(robot.id, "teleoperation"), answered)

@@ -54,23 +54,23 @@ class Intruder:
         Returns:
             What ends that: it vanishes without giving anything back.
         """
-        held = list[int]()
+        sessions = list[int]()
         goes = [True]
         self.device.register()
 
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Permission):
-                held[:] = [reply.content.session]
-                self.ask(robot, m.StartTeleOp(), session=held[0])
+                sessions[:] = [reply.content.session]
+                self.ask(robot, m.StartTeleOp(), session=sessions[0])
 
         def act() -> bool:
-            if not held:
+            if not sessions:
                 self.ask(DVA, m.PermissionRequest(robot, "teleoperation"), answered)
             return goes[0]
 
         def command() -> bool:
-            if held and goes[0]:
-                self.send_message(robot, m.SetTeleOp(0.4, 0.2), held[0])
+            if sessions and goes[0]:
+                self.send_message(robot, m.SetTeleOp(0.4, 0.2), sessions[0])
             return goes[0]
 
         def ends() -> None:

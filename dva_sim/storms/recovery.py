@@ -255,8 +255,8 @@ class RecoveryProbes:
                 again()
                 return
             self._open.pop(robot, None)
-            held = m.PermissionRevocation(robot, self._probe.device.id_tag, session)
-            self._probe.ask(DVA, held)
+            revocation = m.PermissionRevocation(robot, self._probe.device.id_tag, session)
+            self._probe.ask(DVA, revocation)
 
         def answered(reply: m.Reply) -> None:
             if reply.code in (m.NOT_PERMITTED, m.BAD_SESSION):

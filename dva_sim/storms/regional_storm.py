@@ -152,7 +152,11 @@ class RegionalStorm:
     def id_of(self, label: str) -> str:
         """Return the id of a device by its label; of none, none."""
         labels = self.run.stage.labels
-        return next(id_tag for id_tag, other in labels.items() if other == label) if label else ""
+        return (
+            next(id_tag for id_tag, device_label in labels.items() if device_label == label)
+            if label
+            else ""
+        )
 
     def play(self, enough: Callable[[], bool] = lambda: False) -> StormOutcome:
         """Let the storm pass, and judge it.

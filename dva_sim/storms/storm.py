@@ -170,12 +170,14 @@ class Storm(StormScene):
         robots = [robot.agent for robot in self.robots]
         team = {*self.guards, *self.operators}
         devices = self.run.stage.devices
-        others = [device for device in devices if device.id_tag in team]
+        devices_of_team = [device for device in devices if device.id_tag in team]
         ours = {DVA, *(robot.id for robot in self.robots), *team}
         left_out = [device for device in devices if device.id_tag not in ours]
         events = self.run.dva.core.events.total
-        for name, held, bound in oversized([self.run.dva, *robots, *others], events, left_out):
-            what = f"{name} holds {held}, more than {bound}"
+        for name, size, bound in oversized(
+            [self.run.dva, *robots, *devices_of_team], events, left_out
+        ):
+            what = f"{name} holds {size}, more than {bound}"
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
 
     def _waits(self, node: str, data: bytes) -> bool:

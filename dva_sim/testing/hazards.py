@@ -188,10 +188,10 @@ class _Trial:
         stopped.until = START + STOPPED
         for age in AGES:
             for place in NEARBY_PLACES:
-                free, held = (f.at(*place, START + age) for f in (whole, stopped))
-                if age < STOPPED and not _alike(free, held):
+                free, frozen = (f.at(*place, START + age) for f in (whole, stopped))
+                if age < STOPPED and not _alike(free, frozen):
                     yield "is changed before its source is stopped", f"{age:g} s, {place}"
-                yield from _odd(held, f"stopped, {age:g} s, {place}")
+                yield from _odd(frozen, f"stopped, {age:g} s, {place}")
         end = START + AGES[-1]
         if any(
             stopped.at(*p, end).heat_flux > whole.at(*p, end).heat_flux + 1.0 for p in NEARBY_PLACES

@@ -138,11 +138,11 @@ class _Trial:
             for number in range(LOOKS):
                 now += self._one_of(WAITS)
                 x, y, heading, speed, turn = (self._anything() for _ in range(5))
-                seen = Observation(
+                observation = Observation(
                     tick=number, x=x, y=y, heading=heading, speed=speed, turn_rate=turn, hazards=()
                 )
-                got = strategy.drive(route, View(now, seen, self._one_of(GUESSES)), STOP)
-                case = f"{got!r} on {seen!r}"
+                got = strategy.drive(route, View(now, observation, self._one_of(GUESSES)), STOP)
+                case = f"{got!r} on {observation!r}"
                 if not _is_pair(got):
                     yield "answers no two finite numbers", case
                 elif not -SLACK <= got[0] <= reach.speed + SLACK:
@@ -157,12 +157,14 @@ class _Trial:
         path = Route(np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)]))
         for number in range(LOOKS):
             now += self._one_of(WAITS)
-            seen = Sighting._make([number, *(self._anything() for _ in range(8)), 0.01, math.inf])
+            sighting = Sighting._make(
+                [number, *(self._anything() for _ in range(8)), 0.01, math.inf]
+            )
             delay = self._one_of(GUESSES)
-            point = PointView(now, seen, delay)
-            view = PathView(now, seen, delay, path)
+            point = PointView(now, sighting, delay)
+            view = PathView(now, sighting, delay, path)
             for got in (strategy.point(point), strategy.follow(view)):
-                case = f"{got!r} on {seen!r}"
+                case = f"{got!r} on {sighting!r}"
                 if not _is_pair(got):
                     yield "gives a cursor no velocity", case
                 elif math.hypot(*got) > CURSOR.speed * (1 + SLACK):
@@ -280,7 +282,7 @@ def _way(corners: Sequence[tuple[float, float]]) -> Route:
 def _is_pair(got: Any) -> bool:
     """Return True if the value is a pair of finite numbers."""
     try:
-        one, other = got
-        return math.isfinite(one) and math.isfinite(other)
+        first, second = got
+        return math.isfinite(first) and math.isfinite(second)
     except (TypeError, ValueError):
         return False

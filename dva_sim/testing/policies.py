@@ -131,11 +131,11 @@ def _responders(kind: _Draw, rng: np.random.Generator) -> tuple[Responder, ...]:
     guards = _number(kind.guards, rng)
     robots = _number(kind.robots, rng)
 
-    def one(number: int) -> Responder:
+    def responder(number: int) -> Responder:
         device = f"02:00:00:01:{number // 256:02X}:{number % 256:02X}"
         return Responder(device, "guard" if number < guards else "robot")
 
-    return tuple(one(number) for number in range(guards + robots))
+    return tuple(responder(number) for number in range(guards + robots))
 
 
 def _tasks(kind: _Draw, now: float, auctions: bool, rng: np.random.Generator) -> tuple[Task, ...]:
@@ -265,15 +265,15 @@ def check_policy(
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    one, twin = (load_policy(policy, options) for _ in range(2))
+    original, twin = (load_policy(policy, options) for _ in range(2))
     breaches: dict[str, list[str]] = {}
     slowest = 0.0, ""
-    for number, (kind, situation) in enumerate(situations(one, count, 1), start=1):
+    for number, (kind, situation) in enumerate(situations(original, count, 1), start=1):
         where = f"situation {number} ({kind})"
-        answer = _ask(one, situation, number)
-        other = _ask(twin, situation, number)
-        slowest = max(slowest, (min(answer.took, other.took), where))
-        for promise, case in _broken(one, situation, answer, other):
+        answer = _ask(original, situation, number)
+        twin_answer = _ask(twin, situation, number)
+        slowest = max(slowest, (min(answer.took, twin_answer.took), where))
+        for promise, case in _broken(original, situation, answer, twin_answer):
             breaches.setdefault(promise, []).append(f"{case}in {where}")
     dropped = breaches.pop(TOO_MANY_ROBOTS, [])
     warnings = [line(TOO_MANY_ROBOTS, dropped)] if dropped else []
@@ -306,7 +306,7 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
 
 
 def _broken(
-    policy: Policy, situation: Situation, answer: _Answer, other: _Answer
+    policy: Policy, situation: Situation, answer: _Answer, twin_answer: _Answer
 ) -> Iterator[Case]:
     """Yield the promises that an answer breaks, also in comparison with the other one's."""
     yield from answer.broke
@@ -319,7 +319,7 @@ def _broken(
     if not bad:
         yield from _twice(advice)
         yield from _forbidden(policy, situation, advice)
-        if repr(advice) != repr(other.advice):
+        if repr(advice) != repr(twin_answer.advice):
             yield "advises differently with the same history and random seed", ""
 
 

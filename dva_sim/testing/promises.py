@@ -79,7 +79,7 @@ def broken_in(cases: Iterable[Case]) -> list[str]:
     breaches: dict[str, list[str]] = {}
     for promise, case in cases:
         breaches.setdefault(promise, []).append(case)
-    return [line(promise, own) for promise, own in breaches.items()]
+    return [line(promise, cases_of_promise) for promise, cases_of_promise in breaches.items()]
 
 
 def is_slow(slowest: float, slow: float, what: str) -> list[str]:

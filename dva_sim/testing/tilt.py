@@ -145,12 +145,12 @@ class _FilterTrial:
     def _copies(self) -> Iterator[Case]:
         """Check that copies give the same values independently, and that reading has no effect."""
         samples = self._samples()
-        other = self._samples()
+        odd_samples = self._samples()
         alone = self._values(self.make(), samples)
         one = self.make()
         disturbing = self.make()
         beside = []
-        for number, (sample, odd) in enumerate(zip(samples, other, strict=True), 1):
+        for number, (sample, odd) in enumerate(zip(samples, odd_samples, strict=True), 1):
             one.add(sample)
             disturbing.add(odd)
             if number % (one.batch or 1) == 0:
@@ -273,16 +273,16 @@ class _MappingTrial:
             whole = self.make()
             halves = self.make()
             for _ in range(count):
-                one = whole.command(*reading, PERIOD)
+                single = whole.command(*reading, PERIOD)
                 halves.command(*reading, PERIOD / 2)
                 two = halves.command(*reading, PERIOD / 2)
             if not all(
-                math.isclose(a, b, rel_tol=REACHED_SHARE) for a, b in zip(one, two, strict=True)
+                math.isclose(a, b, rel_tol=REACHED_SHARE) for a, b in zip(single, two, strict=True)
             ):
                 case = f"{_pair_text(two)} after {2 * count} half steps, "
                 yield (
                     "integrates by steps, not by time",
-                    f"{case}{_pair_text(one)} after {count} whole",
+                    f"{case}{_pair_text(single)} after {count} whole",
                 )
 
     def _rest(self) -> Iterator[Case]:

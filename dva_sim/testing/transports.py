@@ -79,9 +79,9 @@ class _Trial:
     def _carry(self) -> Iterator[Case]:
         """Yield commands and pictures; the second time on the ports of the first."""
         with _Robot(self._make, self._port) as robot:
-            seen: list[bytes] = []
+            received: list[bytes] = []
             try:
-                near = self._make().near(robot.place, seen.append)
+                near = self._make().near(robot.place, received.append)
             except TransportError as error:
                 yield (CONNECTS if not self.count else LEAVES), str(error)
                 return
@@ -91,7 +91,7 @@ class _Trial:
             if self._make().carries_pictures:
                 sent = [bytes([number]) * size for number, size in enumerate(PICTURES, 1)]
                 robot.pictures.extend(sent)
-                yield from self._arrived(SHOWS, sent, seen, near)
+                yield from self._arrived(SHOWS, sent, received, near)
             near.close()
 
     def _commands(self, near: TransportEnd, robot: _Robot) -> Iterator[Case]:
@@ -117,8 +117,8 @@ class _Trial:
         self.slowest = max(self.slowest, time.monotonic() - start)
         if sent and sent[-1] not in received:
             yield promise, f"the last of {len(sent)} did not come within {ARRIVES_S:g} s"
-        if others := [data for data in received if data not in sent]:
-            yield promise, f"{others[0][:40]!r} was not sent"
+        if strangers := [data for data in received if data not in sent]:
+            yield promise, f"{strangers[0][:40]!r} was not sent"
 
     def _stay_away(self) -> Iterator[Case]:
         """Yield cases in which the robot's end takes nothing for a while."""

@@ -54,14 +54,14 @@ class Lidar:
         eyes = np.array([body.pose() for body in bodies]).reshape(-1, 3)
         best = np.full(len(bodies) * self.rays, self.reach)
         self._meet_segments(eyes, best, *self._walls_near(eyes))
-        others = [*self._world.robots, *self._world.people]
-        seen, by = self._others_near(bodies, eyes, others)
-        angular = np.array([bool(_corners(body)) for body in others], bool)
-        discs = ~angular[seen]
-        edged = angular[seen]
-        places = np.array([(body.x, body.y, body.radius) for body in others]).reshape(-1, 3)
-        self._meet_discs(eyes, best, by[discs], places[seen[discs]])
-        self._meet_segments(eyes, best, *_edges(others, seen[edged], by[edged]))
+        bodies_around = [*self._world.robots, *self._world.people]
+        near, by = self._others_near(bodies, eyes, bodies_around)
+        angular = np.array([bool(_corners(body)) for body in bodies_around], bool)
+        discs = ~angular[near]
+        edged = angular[near]
+        places = np.array([(body.x, body.y, body.radius) for body in bodies_around]).reshape(-1, 3)
+        self._meet_discs(eyes, best, by[discs], places[near[discs]])
+        self._meet_segments(eyes, best, *_edges(bodies_around, near[edged], by[edged]))
         return best.reshape(len(bodies), self.rays)
 
     def read(self, body: RobotBody) -> Floats:

@@ -42,15 +42,15 @@ class Sight:
         bx, by = b
         sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
-        one, other = sides.T
-        apart = (np.minimum(one, other) < -ON_LINE) & (np.maximum(one, other) > ON_LINE)
+        start, end = sides.T
+        apart = (np.minimum(start, end) < -ON_LINE) & (np.maximum(start, end) > ON_LINE)
         blocked = apart & (across[::2] * across[1::2] < 0)
         return not blocked.any()
 
     def from_point(self, a: Point, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return True for each of many places `(..., 2)` [m] that can be seen from one."""
         flat = points.reshape(-1, 2)
-        seen = np.ones(len(flat), bool)
+        is_visible = np.ones(len(flat), bool)
         ends = self._ends.T.reshape(-1, 2, 2)
         for (px, py), (qx, qy) in ends.tolist():
             p = (px, py)
@@ -60,8 +60,8 @@ class Sight:
             sides = _side(p, q, flat.T)
             across = (np.minimum(side_a, sides) < -on_line) & (np.maximum(side_a, sides) > on_line)
             ends_apart = _side(a, flat.T, p) * _side(a, flat.T, q) < 0
-            seen &= ~(across & ends_apart)
-        return seen.reshape(points.shape[:-1])
+            is_visible &= ~(across & ends_apart)
+        return is_visible.reshape(points.shape[:-1])
 
 
 def _side(p: Any, q: Any, point: Any) -> Any:

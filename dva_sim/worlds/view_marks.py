@@ -114,8 +114,8 @@ def _draw_desks(ax: Axes, site: Site) -> None:
 def draw_views(ax: Axes, site: Site) -> None:
     """Draw the floor that each fixed camera sees."""
     for camera in site.cameras:
-        seen = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.08, lw=0, zorder=1.8)
-        ax.add_patch(seen)
+        area = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.08, lw=0, zorder=1.8)
+        ax.add_patch(area)
 
 
 def view_of(site: Site, camera: FixedCamera) -> Floats:

@@ -147,17 +147,17 @@ class ScriptedDispatcher:
     def _wish(self, status: m.EventStatus, proposal: m.Proposal) -> m.Body | None:
         """Return what it wants done; None if the policy has done it, or nothing can be done."""
         number = status.event_id
-        seen = status.decisions
+        decisions = status.decisions
         task = proposal.task
         rule = self._rule(status, proposal)
         if rule is None:
             if status.proposed is None or proposal.device is None:
                 return None
-            return m.Assign(number, proposal.device, None, task, None, seen)
+            return m.Assign(number, proposal.device, None, task, None, decisions)
         if rule.sends == "nobody":
-            return m.FalseAlarm(number, "as the script says", seen)
+            return m.FalseAlarm(number, "as the script says", decisions)
         if rule.sends == "others":
-            return m.Escalate(number, "as the script says", seen)
+            return m.Escalate(number, "as the script says", decisions)
         able = [
             (who.arrival_in, who.device)
             for who in proposal.candidates
@@ -171,7 +171,7 @@ class ScriptedDispatcher:
             return None
         if status.event_state not in ("pending", "assigned") and task == "confirm":
             return None
-        return m.Assign(number, chosen, None, task, "as the script says", seen)
+        return m.Assign(number, chosen, None, task, "as the script says", decisions)
 
     def _rule(self, status: m.EventStatus, proposal: m.Proposal) -> Overrule | None:
         for index, rule in enumerate(self.profile.overrules):

@@ -48,9 +48,9 @@ class EventHistory:
         self._known = status
         if before is None:
             self._add(EventStep(at - status.age, "reported"))
-        seen = status.acknowledged
-        if seen is not None and (before is None or before.acknowledged is None):
-            self._add(EventStep(at - seen.ago, "acknowledge", seen.label))
+        acknowledgement = status.acknowledged
+        if acknowledgement is not None and (before is None or before.acknowledged is None):
+            self._add(EventStep(at - acknowledgement.ago, "acknowledge", acknowledgement.label))
         is_new = status.event_state != ("pending" if before is None else before.event_state)
         if is_new or (before is not None and status.responder != before.responder):
             responder = status.responder or status.actor

@@ -208,12 +208,12 @@ class Avoidance:
 
     def _can_reach(self, here: Floats, place: Floats, others: Sequence[Nearby]) -> bool:
         """Return True if the straight path keeps clear of walls and others."""
-        line = np.linspace(here, place, 2 + int(math.dist(here, place) / 0.1))
-        room = self.room_at(line) - self.radius
+        points = np.linspace(here, place, 2 + int(math.dist(here, place) / 0.1))
+        room = self.room_at(points) - self.radius
         if (room < min(0.02, float(room[0]) - 0.01)).any():
             return False
         for other in others:
-            gap = np.hypot(*(line - (other.x, other.y)).T) - self.radius - other.radius
+            gap = np.hypot(*(points - (other.x, other.y)).T) - self.radius - other.radius
             if (gap < min(other.keep, float(gap[0]) - 0.01)).any():
                 return False
         return True

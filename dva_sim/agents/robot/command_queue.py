@@ -81,16 +81,16 @@ _make_letter = maker(Letter)
 
 
 StandingOf = Callable[[Letter], Standing]
-Line = deque[Letter]
-LineOf = tuple[Hashable, bool]  # whose, and whether it is of commands
+Queue = deque[Letter]
+QueueKey = tuple[Hashable, bool]  # the connection, and whether the queue holds commands
 
 
 class FairQueue:
-    """A line for the control and one for the commands of each connection; lines have turns.
+    """A queue of control requests and one of commands for each connection, served in turn.
 
     A busy sender delays only itself. A connection that is not the holder's has
-    `PER_CONNECTION` places; where there is no room at all, the newest of the longest line makes
-    some, strangers first.
+    `PER_CONNECTION` places. If there is no room at all, the newest message of the longest queue
+    is dropped, strangers first.
 
     Args:
         limit: Maximum number of queued messages of the holder; of others no more than
@@ -105,82 +105,79 @@ class FairQueue:
         self._limit = limit
         self._standing = standing
         self.length = 0
-        self._lines: OrderedDict[LineOf, Line] = OrderedDict()
+        self._queues: OrderedDict[QueueKey, Queue] = OrderedDict()
 
     def count(self, holders: bool) -> int:
-        """Return how many are the holder's, or are not."""
+        """Return the number of messages of the holder, or of all others."""
         return sum(map(len, self._beside(holders).values()))
 
-    def _beside(self, holders: bool) -> dict[LineOf, Line]:
-        return {k: v for k, v in self._lines.items() if (self._standing(v[0]) == 0) is holders}
+    def _beside(self, holders: bool) -> dict[QueueKey, Queue]:
+        return {k: v for k, v in self._queues.items() if (self._standing(v[0]) == 0) is holders}
 
     def has(self, standing: Standing) -> bool:
-        """Return True if a message of this standing is next in its line."""
-        return any(self._standing(line[0]) is standing for line in self._lines.values())
+        """Return True if a message of this standing is next in its queue."""
+        return any(self._standing(queue[0]) is standing for queue in self._queues.values())
 
     def put(self, letter: Letter) -> Letter | None:
-        """Take a letter in; the one that finds no room, if any: another, or itself."""
+        """Add a letter; return the one dropped for lack of room, if any, which may be itself."""
         gone = None
         standing = self._standing(letter)
         if standing is not HOLDER or self.length >= self._limit:
             gone = self._make_room(letter, standing)
             if gone is letter:
                 return letter
-        self._lines.setdefault((letter.peer, letter.moves), deque()).append(letter)
+        self._queues.setdefault((letter.peer, letter.moves), deque()).append(letter)
         self.length += 1
         return gone
 
     def _make_room(self, letter: Letter, standing: Standing) -> Letter | None:
-        """Return the one that has to go for a letter, if any.
-
-        Another, which is gone then, or itself.
-        """
-        mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
+        """Drop and return the letter that does not fit, if any: another one or itself."""
+        mine = [len(self._queues.get((letter.peer, moves), ())) for moves in (False, True)]
         if standing is not HOLDER and sum(mine) >= PER_CONNECTION:
             return letter
         places = self._limit if standing is HOLDER else min(self._limit, MAX_OF_OTHERS)
         if self.length >= places:
             beside = self._beside(standing is HOLDER)
             if sum(map(len, beside.values())) >= places:
-                worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
-                if (standing, mine[letter.moves] + 1) >= self._rank(line):
+                worst, queue = max(beside.items(), key=lambda one: self._rank(one[1]))
+                if (standing, mine[letter.moves] + 1) >= self._rank(queue):
                     return letter
                 return self._take(worst, newest=True)
         return None
 
-    def _rank(self, line: Line) -> tuple[Standing, int]:
-        return self._standing(line[0]), len(line)
+    def _rank(self, queue: Queue) -> tuple[Standing, int]:
+        return self._standing(queue[0]), len(queue)
 
-    def next_lines(self) -> dict[Standing, LineOf]:
-        """Return the line whose turn it is, of each standing that waits.
+    def next_queues(self) -> dict[Standing, QueueKey]:
+        """Return the queue whose turn it is, for each standing that has messages.
 
-        The holder's control comes before its commands. With strangers that would let some keep
-        others out.
+        The holder's control requests come before its commands. Among strangers the same rule
+        would let some of them keep the others out.
         """
-        lines: dict[Standing, LineOf] = {}
-        for key, line in self._lines.items():
-            standing = self._standing(line[0])
-            first = lines.setdefault(standing, key)
+        keys: dict[Standing, QueueKey] = {}
+        for key, queue in self._queues.items():
+            standing = self._standing(queue[0])
+            first = keys.setdefault(standing, key)
             if standing is HOLDER and key[1] < first[1]:
-                lines[standing] = key
-        return lines
+                keys[standing] = key
+        return keys
 
-    def pop(self, key: LineOf) -> Letter:
-        """Return the next one of a line, which then waits until all others have had their turn."""
-        self._lines.move_to_end(key)
+    def pop(self, key: QueueKey) -> Letter:
+        """Return a queue's next letter; the queue then waits until all others had their turn."""
+        self._queues.move_to_end(key)
         return self._take(key)
 
-    def _take(self, key: LineOf, newest: bool = False) -> Letter:
-        line = self._lines[key]
-        letter = line.pop() if newest else line.popleft()
-        if not line:
-            del self._lines[key]
+    def _take(self, key: QueueKey, newest: bool = False) -> Letter:
+        queue = self._queues[key]
+        letter = queue.pop() if newest else queue.popleft()
+        if not queue:
+            del self._queues[key]
         self.length -= 1
         return letter
 
     def forget_published(self) -> int:
-        """Drop what nobody waits to be answered: how many those were."""
-        gone = len(self._lines.pop((PUBLISHED, True), ()))
+        """Drop published commands, which nobody waits for; return their number."""
+        gone = len(self._queues.pop((PUBLISHED, True), ()))
         self.length -= gone
         return gone
 
@@ -361,18 +358,18 @@ class CommandQueue:
         return self._emergencies if letter is None else [letter]
 
     def _next_of_others(self) -> Letter | None:
-        """Return the holder's after each of another; the DVA and strangers by turns."""
+        """Return one of the holder's after each other; the DVA and strangers take turns."""
         if not self._waiting.length:
             return None
-        lines = self._waiting.next_lines()
-        others = self._turns
-        for one in (*others, HOLDER) if self._last is HOLDER else (HOLDER, *others):
-            if one not in lines or (one is OTHER and self._others_rest()):
+        keys = self._waiting.next_queues()
+        turns = self._turns
+        for standing in (*turns, HOLDER) if self._last is HOLDER else (HOLDER, *turns):
+            if standing not in keys or (standing is OTHER and self._others_rest()):
                 continue
-            self._last = one
-            if one is not HOLDER:
-                self._turns = [*(other for other in others if other is not one), one]
-            return self._waiting.pop(lines[one])
+            self._last = standing
+            if standing is not HOLDER:
+                self._turns = [*(other for other in turns if other is not standing), standing]
+            return self._waiting.pop(keys[standing])
         return None
 
     def _others_rest(self) -> bool:

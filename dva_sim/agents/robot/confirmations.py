@@ -67,8 +67,8 @@ class Confirmations:
         if question is not None:
             self._happened(ASKS)
             self._device.recorder.counters["asked the DVA who holds a robot"] += 1
-            for one in self._waiting_for(question):
-                one.asked = True
+            for wait in self._waiting_for(question):
+                wait.asked = True
             self._device.ask(self._device.dva, question, self._answered, self._failed)
             return
         due = self._inquiry.due(clock.now)
@@ -78,7 +78,7 @@ class Confirmations:
 
     def keep(self, letter: Letter, message: m.Message) -> bool:
         """Queue a message until the DVA has answered; False if the queue is full."""
-        of_peer = sum(one.letter.peer == letter.peer for one in self._waiting)
+        of_peer = sum(wait.letter.peer == letter.peer for wait in self._waiting)
         if of_peer >= PER_CONNECTION or len(self._waiting) >= MAX_OF_OTHERS:
             return False
         reader = message.source if isinstance(message.body, m.DevSub) else None
@@ -94,7 +94,7 @@ class Confirmations:
 
     def _waiting_for(self, question: m.GetGrant) -> list[Waiting]:
         reader = question.holder if question.level is not None else None
-        return [one for one in self._waiting if one.reader == reader]
+        return [wait for wait in self._waiting if wait.reader == reader]
 
     def _answered(self, reply: m.Reply) -> None:
         if self._device.silent:  # its computer hangs, or has no power: it has not heard that
@@ -102,7 +102,7 @@ class Confirmations:
             return
         question = self._inquiry.asked
         of = self._waiting_for(question) if question is not None else []
-        settled = [one for one in of if one.asked]
+        settled = [wait for wait in of if wait.asked]
         if not self._decide(reply).waits:
             self._release(settled)
         self.ask()
@@ -117,7 +117,7 @@ class Confirmations:
         self.ask()
 
     def _release(self, those: list[Waiting]) -> None:
-        for one in those:
-            if one in self._waiting:
-                self._waiting.remove(one)
-                self._conclude(one.letter)
+        for wait in those:
+            if wait in self._waiting:
+                self._waiting.remove(wait)
+                self._conclude(wait.letter)

@@ -396,9 +396,9 @@ class RobotController:
 
     def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
         """Replace the holder, or leave the robot without one; the current driver is stopped."""
-        held = self.grant
+        current = self.grant
         self.grant = grant
-        if grant is not None and held is not None and grant.session == held.session:
+        if grant is not None and current is not None and grant.session == current.session:
             return Decision(m.OK)  # the holder may have moved
         if grant is not None and grant.session != self._numbered:
             self.last_order_id = 0
@@ -417,15 +417,15 @@ class RobotController:
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
-        held = self._grants_of(message.source)
+        grants = self._grants_of(message.source)
         if body.sensor not in {sensor.name for sensor in self.sensors}:
             names: Iterable[str] = (sensor.name for sensor in self.sensors)
             offer = f"there are {', '.join(names) or 'none'}"
             return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {offer}")
-        if not any(body.sensor in grant.sensors for grant in held):
+        if not any(body.sensor in grant.sensors for grant in grants):
             text = f"{message.source} may not subscribe to {body.sensor}"
             return self._full(message.source) or Decision(m.NOT_PERMITTED, text, waits=True)
-        if message.session not in {g.session for g in held if body.sensor in g.sensors}:
+        if message.session not in {g.session for g in grants if body.sensor in g.sensors}:
             text = f"session {message.session} is not the current one"
             return Decision(m.BAD_SESSION, text, waits=True)
         return Decision(m.OK)

@@ -59,7 +59,7 @@ class FieldOfView:
         self, x: float, y: float, heading: float, hazards: Iterable[HazardSpot]
     ) -> tuple[SeenHazard, ...]:
         """Return the hazards in a picture taken from a pose [m, rad]."""
-        seen = []
+        sights = []
         for hazard in hazards:
             dx = hazard.x - x
             dy = hazard.y - y
@@ -77,8 +77,8 @@ class FieldOfView:
             depth = 0.0 if hazard.shines else self.smoke(here, place)
             if depth < SEEN_THROUGH:
                 looks = 2.0 * half_width, math.exp(-depth)
-                seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance, *looks))
-        return tuple(seen)
+                sights.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance, *looks))
+        return tuple(sights)
 
     def visibility(self, x: float, y: float, heading: float) -> float:
         """Return how far things that do not glow are visible from a pose [m, rad]; at most `CLEAR`.

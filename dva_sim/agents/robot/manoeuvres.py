@@ -76,16 +76,16 @@ class Manoeuvre:
     state: str
     reason: str
 
-    def step(self, seen: Sensed) -> Intent | None:
+    def step(self, percept: Sensed) -> Intent | None:
         """Return what to do now; None when the manoeuvre is over."""
         raise NotImplementedError
 
 
 class JamRecovery(Manoeuvre):
-    """Out of a jam: turn on the spot to where the way is free, and drive off a little.
+    """Way out of a jam: turn on the spot towards free space, and drive a short distance.
 
     Args:
-        seen: The moment of the jam.
+        percept: Observation at the moment of the jam.
         guard: Knows what is free.
         most_turn: Highest turn rate [rad/s].
         tried: Headings that did not help [rad].
@@ -95,43 +95,43 @@ class JamRecovery(Manoeuvre):
     reason = "jammed"
 
     def __init__(
-        self, seen: Sensed, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
+        self, percept: Sensed, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
     ) -> None:
         self._guard = guard
         self._turn = most_turn
-        self._until = seen.now + MAX_RECOVERY
-        self._start = seen.here
+        self._until = percept.now + MAX_RECOVERY
+        self._start = percept.here
         self._turned = False
-        self.heading = self._way_out(seen, tried)
+        self.heading = self._way_out(percept, tried)
 
-    def _way_out(self, seen: Sensed, tried: Sequence[float]) -> float:
+    def _way_out(self, percept: Sensed, tried: Sequence[float]) -> float:
         """Return the freest heading; the less to turn, the better where several are free."""
 
         def worth(heading: float) -> float:
-            pose = (*seen.here, heading)
-            free = self._guard.free_way(pose, MANOEUVRE_MPS, 0.0, seen.nearby, 2 * GET_AWAY)
+            pose = (*percept.here, heading)
+            free = self._guard.free_way(pose, MANOEUVRE_MPS, 0.0, percept.nearby, 2 * GET_AWAY)
             again = any(abs(wrap(heading - other)) < TRIED_WITHIN_RAD for other in tried)
-            return free - 0.1 * abs(wrap(heading - seen.view.heading)) - 5.0 * again
+            return free - 0.1 * abs(wrap(heading - percept.view.heading)) - 5.0 * again
 
         turns = [2.0 * math.pi * number / HEADINGS for number in range(1, HEADINGS)]
-        return max((seen.view.heading + turn for turn in turns), key=worth)
+        return max((percept.view.heading + turn for turn in turns), key=worth)
 
-    def step(self, seen: Sensed) -> Intent | None:
+    def step(self, percept: Sensed) -> Intent | None:
         """Turn, then drive; return True when far enough away, or when it takes too long."""
-        if seen.now > self._until or math.dist(seen.here, self._start) > GET_AWAY:
+        if percept.now > self._until or math.dist(percept.here, self._start) > GET_AWAY:
             return None
-        self._turned = self._turned or abs(wrap(self.heading - seen.view.heading)) < FACING
-        turn = turn_to(seen.view, self.heading, self._turn)
+        self._turned = self._turned or abs(wrap(self.heading - percept.view.heading)) < FACING
+        turn = turn_to(percept.view, self.heading, self._turn)
         return Intent(MANOEUVRE_MPS, turn.turn_rate) if self._turned else turn
 
 
 class Aside(Manoeuvre):
-    """Out of the way: drive to a place beside it and wait until the others have passed.
+    """Move out of the way: drive to a place beside the path and wait until others have passed.
 
     Args:
-        seen: The moment it begins.
+        percept: Observation when it begins.
         place: Waiting place [m].
-        way: Path to keep free, shape `(n, 2)` [m].
+        path: Path to keep free, shape `(n, 2)` [m].
         radius: Radius of the robot [m].
         most_turn: Highest turn rate [rad/s].
     """
@@ -140,40 +140,42 @@ class Aside(Manoeuvre):
     reason = "somebody is in the way"
 
     def __init__(
-        self, seen: Sensed, place: Point, path: Floats, radius: float, most_turn: float
+        self, percept: Sensed, place: Point, path: Floats, radius: float, most_turn: float
     ) -> None:
         self._place = place
         self._way = path
         self._radius = radius
         self._turn = most_turn
-        self._until = seen.now + MAX_ASIDE
+        self._until = percept.now + MAX_ASIDE
         self._arrived = False
         self._free_since = math.inf
-        self._moved = seen.now
+        self._moved = percept.now
 
-    def step(self, seen: Sensed) -> Intent | None:
+    def step(self, percept: Sensed) -> Intent | None:
         """Drive there, stand, and go on when the way has been free for a moment."""
-        self._free_since = min(self._free_since, seen.now) if self._is_free(seen) else math.inf
-        if any(math.hypot(other.vx, other.vy) > STANDS_BELOW_MPS for other in seen.nearby):
-            self._moved = seen.now
-        stays = self._arrived and seen.now - self._moved > NOBODY_MOVES
-        if seen.now - self._free_since >= FREE_FOR or seen.now > self._until or stays:
+        self._free_since = (
+            min(self._free_since, percept.now) if self._is_free(percept) else math.inf
+        )
+        if any(math.hypot(other.vx, other.vy) > STANDS_BELOW_MPS for other in percept.nearby):
+            self._moved = percept.now
+        stays = self._arrived and percept.now - self._moved > NOBODY_MOVES
+        if percept.now - self._free_since >= FREE_FOR or percept.now > self._until or stays:
             return None
-        self._arrived = self._arrived or math.dist(seen.here, self._place) < REACHED_WITHIN_M
+        self._arrived = self._arrived or math.dist(percept.here, self._place) < REACHED_WITHIN_M
         if self._arrived:
             return Intent(0.0, 0.0)
         x, y = self._place
-        bearing = math.atan2(y - seen.view.y, x - seen.view.x)
-        turn = turn_to(seen.view, bearing, self._turn)
+        bearing = math.atan2(y - percept.view.y, x - percept.view.x)
+        turn = turn_to(percept.view, bearing, self._turn)
         return (
             turn
-            if abs(wrap(bearing - seen.view.heading)) > 0.3
+            if abs(wrap(bearing - percept.view.heading)) > 0.3
             else turn._replace(speed=MANOEUVRE_MPS)
         )
 
-    def _is_free(self, seen: Sensed) -> bool:
+    def _is_free(self, percept: Sensed) -> bool:
         """Return True if nobody is on the path ahead, or will be in a moment."""
-        for other in seen.nearby:
+        for other in percept.nearby:
             for ahead in (0.0, 1.0, 2.0):
                 x = other.x + ahead * other.vx
                 y = other.y + ahead * other.vy
@@ -216,53 +218,53 @@ class Inspection:
         self._turned = 0.0
         self._heading = 0.0
 
-    def begins(self, seen: Sensed) -> bool:
+    def begins(self, percept: Sensed) -> bool:
         """Return True once the robot is where it can look from."""
-        if self._since == math.inf and self._is_at_view(seen):
-            self._since = seen.now
+        if self._since == math.inf and self._is_at_view(percept):
+            self._since = percept.now
         return self._since < math.inf
 
-    def is_over(self, seen: Sensed) -> bool:
+    def is_over(self, percept: Sensed) -> bool:
         """Return True if it has looked for long enough."""
-        return seen.now - self._since > INSPECT_FOR
+        return percept.now - self._since > INSPECT_FOR
 
-    def finding(self, seen: Sensed) -> str:
+    def finding(self, percept: Sensed) -> str:
         """Describe what is in view."""
-        what = self._event.replace("_", " ") if self._in_view(seen) else "nothing"
+        what = self._event.replace("_", " ") if self._in_view(percept) else "nothing"
         return f"{what} {IN_VIEW}"
 
-    def step(self, seen: Sensed) -> Intent:
+    def step(self, percept: Sensed) -> Intent:
         """Face the event; with nothing in view, first its place, then all around, once."""
-        event = self._in_view(seen)
+        event = self._in_view(percept)
         if event is not None:
             self._nothing_since = math.inf
-            return self._face(seen, (event.x, event.y))
-        self._nothing_since = min(self._nothing_since, seen.now)
-        if seen.now - self._nothing_since < FIRST_LOOK:
-            self._heading = seen.view.heading
-            return self._face(seen, self._place)
-        self._turned += abs(seen.view.heading - self._heading)
-        self._heading = seen.view.heading
+            return self._face(percept, (event.x, event.y))
+        self._nothing_since = min(self._nothing_since, percept.now)
+        if percept.now - self._nothing_since < FIRST_LOOK:
+            self._heading = percept.view.heading
+            return self._face(percept, self._place)
+        self._turned += abs(percept.view.heading - self._heading)
+        self._heading = percept.view.heading
         return STANDSTILL if self._turned > 2.0 * math.pi else Intent(0.0, LOOK_AROUND)
 
-    def _is_at_view(self, seen: Sensed) -> bool:
-        event = self._in_view(seen)
+    def _is_at_view(self, percept: Sensed) -> bool:
+        event = self._in_view(percept)
         if event is not None and event.distance <= LOOK_FROM:
             return True
-        near = math.dist(seen.here, self._place) < KEEP_OFF
-        return near and self._sees(seen.here, self._place)
+        near = math.dist(percept.here, self._place) < KEEP_OFF
+        return near and self._sees(percept.here, self._place)
 
-    def _in_view(self, seen: Sensed) -> SeenHazard | None:
+    def _in_view(self, percept: Sensed) -> SeenHazard | None:
         """Return the event, if it is in the picture."""
         hazards = [
             h
-            for h in seen.view.hazards
+            for h in percept.view.hazards
             if h.kind == self._event and math.dist((h.x, h.y), self._place) < MATCH_WITHIN
         ]
         return min(hazards, key=lambda h: h.distance, default=None)
 
-    def _face(self, seen: Sensed, place: Point) -> Intent:
-        bearing = math.atan2(place[1] - seen.view.y, place[0] - seen.view.x)
-        if abs(wrap(bearing - seen.view.heading)) < FACING:
+    def _face(self, percept: Sensed, place: Point) -> Intent:
+        bearing = math.atan2(place[1] - percept.view.y, place[0] - percept.view.x)
+        if abs(wrap(bearing - percept.view.heading)) < FACING:
             return STANDSTILL
-        return turn_to(seen.view, bearing, self._most)
+        return turn_to(percept.view, bearing, self._most)

@@ -156,18 +156,18 @@ class Pilot:
         self._moved = -math.inf  # when who is in the way was last seen to move [s]
         self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
 
-    def step(self, seen: Sensed) -> PilotStep:
+    def step(self, percept: Sensed) -> PilotStep:
         """Return what to do now."""
-        if seen.charge < RESERVE and not self._errand.home:
+        if percept.charge < RESERVE and not self._errand.home:
             return self._end("failed", "battery")
-        seen = self._with_patience(seen)
-        if seen.jammed and not isinstance(self._manoeuvre, JamRecovery):
-            return self._jam(seen)
+        percept = self._with_patience(percept)
+        if percept.jammed and not isinstance(self._manoeuvre, JamRecovery):
+            return self._jam(percept)
         if self._manoeuvre is not None:
-            return self._go_on_with(self._manoeuvre, seen)
-        if self._inspection is not None and self._inspection.begins(seen):
-            return self._look(seen, self._inspection)
-        return self._travel(seen)
+            return self._go_on_with(self._manoeuvre, percept)
+        if self._inspection is not None and self._inspection.begins(percept):
+            return self._look(percept, self._inspection)
+        return self._travel(percept)
 
     # --- words -------------------------------------------------------------------------
 
@@ -183,49 +183,49 @@ class Pilot:
     def _end(self, state: str, reason: str = "") -> PilotStep:
         return PilotStep(STANDSTILL, state, 0 if state == "done" else self._left, reason)
 
-    def _move(self, seen: Sensed, intent: Intent, state: str, reason: str = "") -> PilotStep:
+    def _move(self, percept: Sensed, intent: Intent, state: str, reason: str = "") -> PilotStep:
         """Go, but never into anything, and gently beside people."""
-        pose = (*seen.here, seen.view.heading)
-        speed = pace_among(seen.nearby, seen.here, self._radius, intent.speed)
-        speed = self._guard.limit(pose, speed, intent.turn_rate, seen.nearby)
+        pose = (*percept.here, percept.view.heading)
+        speed = pace_among(percept.nearby, percept.here, self._radius, intent.speed)
+        speed = self._guard.limit(pose, speed, intent.turn_rate, percept.nearby)
         return PilotStep(Intent(speed, intent.turn_rate), state, self._left, reason)
 
     # --- on the way --------------------------------------------------------------------
 
-    def _travel(self, seen: Sensed) -> PilotStep:
-        route = self._route or self._plan(seen)
+    def _travel(self, percept: Sensed) -> PilotStep:
+        route = self._route or self._plan(percept)
         if route is None:
             return self._end("failed", "no way")
-        left = route.remaining(seen.view.x, seen.view.y)
+        left = route.remaining(percept.view.x, percept.view.y)
         if left < REACHED_WITHIN_M:
             return self._arrive()
-        if self._gets_nowhere(seen, left):
-            return self._jam(seen)
-        if not seen.nearby:
+        if self._gets_nowhere(percept, left):
+            return self._jam(percept)
+        if not percept.nearby:
             self._blocked_since = math.inf
-            return self._move(seen, self._drive(route, seen), "under_way")
+            return self._move(percept, self._drive(route, percept), "under_way")
         along = route.length - left
-        lane = self._avoidance.lane(route, along, seen.here, seen.nearby, self._side)
+        lane = self._avoidance.lane(route, along, percept.here, percept.nearby, self._side)
         if isinstance(lane, Blocked):
-            return self._wait(seen, route, along, lane)
+            return self._wait(percept, route, along, lane)
         self._side = lane.side
         self._blocked_since = math.inf
-        return self._move(seen, self._drive(Route(lane.points), seen), "under_way")
+        return self._move(percept, self._drive(Route(lane.points), percept), "under_way")
 
-    def _drive(self, route: Route, seen: Sensed) -> Intent:
+    def _drive(self, route: Route, percept: Sensed) -> Intent:
         """Return the way's next intent; a car drives its sharpest curve where others turn."""
         speed, turn_rate = self._driver.drive(
-            route, View(seen.now, seen.view, PERIOD), REACHED_WITHIN_M
+            route, View(percept.now, percept.view, PERIOD), REACHED_WITHIN_M
         )
         return Intent(
             max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate
         )
 
-    def _plan(self, seen: Sensed) -> Route | None:
-        points = self._planner.path(seen.here, self._goal, self._closed)
+    def _plan(self, percept: Sensed) -> Route | None:
+        points = self._planner.path(percept.here, self._goal, self._closed)
         if points is None and self._closed:
             self._closed = []
-            points = self._planner.path(seen.here, self._goal)
+            points = self._planner.path(percept.here, self._goal)
         self._route = None if points is None else Route(points)
         self._progress = math.inf, math.inf
         return self._route
@@ -239,63 +239,65 @@ class Pilot:
         self._begin_leg()
         return PilotStep(STANDSTILL, "under_way", self._left)
 
-    def _gets_nowhere(self, seen: Sensed, left: float) -> bool:
+    def _gets_nowhere(self, percept: Sensed, left: float) -> bool:
         best, since = self._progress
         if left < best - 0.1 or self._blocked_since < math.inf:
-            self._progress = min(left, best), seen.now
+            self._progress = min(left, best), percept.now
             return False
-        return seen.now - since > NO_PROGRESS
+        return percept.now - since > NO_PROGRESS
 
-    def _look(self, seen: Sensed, inspection: Inspection) -> PilotStep:
+    def _look(self, percept: Sensed, inspection: Inspection) -> PilotStep:
         """Face the event and wait for somebody who says what next."""
-        finding = inspection.finding(seen)
-        if inspection.is_over(seen):
+        finding = inspection.finding(percept)
+        if inspection.is_over(percept):
             return self._end("done", finding)
-        return self._move(seen, inspection.step(seen), "waiting", finding)
+        return self._move(percept, inspection.step(percept), "waiting", finding)
 
     # --- in the way --------------------------------------------------------------------
 
-    def _with_patience(self, seen: Sensed) -> Sensed:
+    def _with_patience(self, percept: Sensed) -> Sensed:
         """Let a robot that has waited for long go nearer to people, until none is in sight."""
-        waited = seen.now - self._blocked_since > SQUEEZE_AFTER
-        people = any(o.kind == "person" for o in seen.nearby)
+        waited = percept.now - self._blocked_since > SQUEEZE_AFTER
+        people = any(o.kind == "person" for o in percept.nearby)
         self._squeezing = people and (self._squeezing or waited)
         if not self._squeezing:
-            return seen
-        closer = tuple(o._replace(keep=min(o.keep, SQUEEZE)) for o in seen.nearby)
-        return seen._replace(nearby=closer)
+            return percept
+        closer = tuple(o._replace(keep=min(o.keep, SQUEEZE)) for o in percept.nearby)
+        return percept._replace(nearby=closer)
 
-    def _wait(self, seen: Sensed, route: Route, along: float, blocked: Blocked) -> PilotStep:
+    def _wait(self, percept: Sensed, route: Route, along: float, blocked: Blocked) -> PilotStep:
         """Stop short; then step aside, or look for a way around, or give up."""
-        self._blocked_since = min(self._blocked_since, seen.now)
-        waited = seen.now - self._blocked_since
+        self._blocked_since = min(self._blocked_since, percept.now)
+        waited = percept.now - self._blocked_since
         if math.hypot(blocked.by.vx, blocked.by.vy) > STANDS_BELOW_MPS:
-            self._moved = seen.now
+            self._moved = percept.now
         if waited > GIVE_UP_AFTER:
             return self._end("failed", "no way")
         if waited > SAY_AFTER and self._is_taken(route.length - along, blocked.by):
             return self._arrive()
         crowded = blocked.gap < SQUEEZE
         person = blocked.by.kind == "person"
-        if waited > ASIDE_AFTER and crowded and not person and self._lets_pass(seen, blocked.by):
-            aside = self._step_aside(seen, route, along, blocked.by)
+        if waited > ASIDE_AFTER and crowded and not person and self._lets_pass(percept, blocked.by):
+            aside = self._step_aside(percept, route, along, blocked.by)
             if aside is not None:
                 return aside
-        is_stuck = seen.now - max(self._moved, self._blocked_since) > AROUND_AFTER
-        if is_stuck and seen.now - self._looked_around > AROUND_AGAIN:
-            around = self._way_around(seen)
+        is_stuck = percept.now - max(self._moved, self._blocked_since) > AROUND_AFTER
+        if is_stuck and percept.now - self._looked_around > AROUND_AGAIN:
+            around = self._way_around(percept)
             if around is not None:
                 return around
-        intent = self._drive(Route(blocked.lane.points), seen)
+        intent = self._drive(Route(blocked.lane.points), percept)
         # People are walked past if there is room at all: turning aside takes longer than they do.
-        apart = math.dist(seen.here, (blocked.by.x, blocked.by.y)) if person else blocked.distance
+        apart = (
+            math.dist(percept.here, (blocked.by.x, blocked.by.y)) if person else blocked.distance
+        )
         short = max(apart - STOP_SHORT, 0.0) / 2.0 if crowded else math.inf
         speed = min(intent.speed, short)
         turn = intent.turn_rate * (speed / intent.speed if intent.speed else 1.0)
         if waited < SAY_AFTER:
-            return self._move(seen, Intent(speed, turn), "under_way")
+            return self._move(percept, Intent(speed, turn), "under_way")
         what = "a person" if person else "a robot"
-        return self._move(seen, Intent(speed, turn), "waiting", f"{what} is in the way")
+        return self._move(percept, Intent(speed, turn), "waiting", f"{what} is in the way")
 
     def _is_taken(self, left: float, other: Nearby) -> bool:
         """Return True if somebody stands at the goal, and the robot is as near as it can be."""
@@ -303,32 +305,32 @@ class Pilot:
         gap = math.dist((other.x, other.y), self._goal) - other.radius
         return is_stationary and left < REACHED_IF_TAKEN_M and gap < self._radius + other.keep
 
-    def _lets_pass(self, seen: Sensed, other: Nearby) -> bool:
+    def _lets_pass(self, percept: Sensed, other: Nearby) -> bool:
         """Return True if it should step aside: once for each who goes first and does not leave."""
-        x, y = seen.here
-        apart = math.dist(seen.here, (other.x, other.y))
+        x, y = percept.here
+        apart = math.dist(percept.here, (other.x, other.y))
         goes_away = (other.vx * (other.x - x) + other.vy * (other.y - y)) > 0.05 * apart
-        (first,) = self._avoidance.yields_to(seen.here, [other])
+        (first,) = self._avoidance.yields_to(percept.here, [other])
         can = self._sharpest == 0.0 and self._left_aside != other.name
         return can and first and not goes_away
 
     def _step_aside(
-        self, seen: Sensed, route: Route, along: float, other: Nearby
+        self, percept: Sensed, route: Route, along: float, other: Nearby
     ) -> PilotStep | None:
         path = np.array([route.point_at(along + s) for s in np.arange(-1.0, 6.0, 0.2).tolist()])
-        place = self._avoidance.refuge(seen.here, path, seen.nearby)
+        place = self._avoidance.refuge(percept.here, path, percept.nearby)
         self._left_aside = other.name
         if place is None:
             return None
-        self._manoeuvre = Aside(seen, place, path, self._radius, self._reach.turn_rate)
-        return self._go_on_with(self._manoeuvre, seen)
+        self._manoeuvre = Aside(percept, place, path, self._radius, self._reach.turn_rate)
+        return self._go_on_with(self._manoeuvre, percept)
 
-    def _way_around(self, seen: Sensed) -> PilotStep | None:
+    def _way_around(self, percept: Sensed) -> PilotStep | None:
         """Plan again with everybody in sight as part of the map."""
-        self._looked_around = seen.now
+        self._looked_around = percept.now
         before = self._closed
-        self._closed = [Disc(o.x, o.y, o.radius + o.keep + DETOUR_MARGIN_M) for o in seen.nearby]
-        points = self._planner.path(seen.here, self._goal, self._closed)
+        self._closed = [Disc(o.x, o.y, o.radius + o.keep + DETOUR_MARGIN_M) for o in percept.nearby]
+        points = self._planner.path(percept.here, self._goal, self._closed)
         if points is None:
             self._closed = before
             return None
@@ -338,24 +340,24 @@ class Pilot:
 
     # --- jams --------------------------------------------------------------------------
 
-    def _jam(self, seen: Sensed) -> PilotStep:
+    def _jam(self, percept: Sensed) -> PilotStep:
         self._jams += 1
         if self._jams > MAX_JAMS:
             return self._end("failed", "jammed")
-        heading = seen.view.heading
+        heading = percept.view.heading
         nose = self._radius + 0.1
-        x = seen.view.x + nose * math.cos(heading)
-        y = seen.view.y + nose * math.sin(heading)
+        x = percept.view.x + nose * math.cos(heading)
+        y = percept.view.y + nose * math.sin(heading)
         self._closed.append(Disc(x, y, 0.1))
-        recovery = JamRecovery(seen, self._guard, self._reach.turn_rate, [heading, *self._tried])
+        recovery = JamRecovery(percept, self._guard, self._reach.turn_rate, [heading, *self._tried])
         self._tried.append(recovery.heading)
         self._manoeuvre = recovery
-        return self._go_on_with(recovery, seen)
+        return self._go_on_with(recovery, percept)
 
-    def _go_on_with(self, manoeuvre: Manoeuvre, seen: Sensed) -> PilotStep:
-        intent = manoeuvre.step(seen)
+    def _go_on_with(self, manoeuvre: Manoeuvre, percept: Sensed) -> PilotStep:
+        intent = manoeuvre.step(percept)
         if intent is None:
             self._manoeuvre = None
             self._route = None
             return PilotStep(STANDSTILL, "under_way", self._left)
-        return self._move(seen, intent, manoeuvre.state, manoeuvre.reason)
+        return self._move(percept, intent, manoeuvre.state, manoeuvre.reason)

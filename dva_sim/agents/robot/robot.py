@@ -514,9 +514,9 @@ class RobotAgent:
         me = self.device.id_tag
         fares = self._fares
         self._last_published = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
-        held = min(self.device.clock.now - self._held_since, MAX_HELD)
+        duration = min(self.device.clock.now - self._held_since, MAX_HELD)
         if network.ready(me, HOLDER, WHATEVER_WAITS):
-            self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
+            self.device.publish(HOLDER, m.RobotHolder(self._holder, None, duration, fares or None))
 
     # --- emergency ---------------------------------------------------------------------
 

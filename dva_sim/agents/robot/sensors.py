@@ -122,8 +122,8 @@ class SensorSubscriptions:
 
     def _forget(self, now: float) -> None:
         """End subscriptions that were not renewed, or whose permission is over however it ended."""
-        for (sensor, subscriber), held in list(self._subscribed.items()):
-            if held.until < now or not self._may_read(subscriber, sensor):
+        for (sensor, subscriber), subscription in list(self._subscribed.items()):
+            if subscription.until < now or not self._may_read(subscriber, sensor):
                 del self._subscribed[sensor, subscriber]
 
     def _tick(self) -> bool:
@@ -133,9 +133,9 @@ class SensorSubscriptions:
         for sensor in dict.fromkeys(sensor for sensor, _ in self._subscribed):
             if self._sensors[sensor].lags:
                 self._sensors[sensor].read(now)
-        for (sensor, subscriber), held in self._subscribed.items():
-            if now >= held.due - 1e-9:
-                held.due = max(held.due + held.period, now)
+        for (sensor, subscriber), subscription in self._subscribed.items():
+            if now >= subscription.due - 1e-9:
+                subscription.due = max(subscription.due + subscription.period, now)
                 self._publish(sensor, subscriber, now)
         self._ticking = bool(self._subscribed)
         return self._ticking
@@ -261,7 +261,9 @@ class SensorConfig(Config):
         usual = KINDS[self.name]
         settings = (self.noise, self.resolution, self.low, self.high, self.lag_s)
         pairs = zip(settings, usual[1:], strict=True)
-        return SensorKind(usual.unit, *(other if own is None else own for own, other in pairs))
+        return SensorKind(
+            usual.unit, *(default if value is None else value for value, default in pairs)
+        )
 
 
 class RobotSensor:

@@ -93,6 +93,6 @@ def _gains(response: Floats, movers: Sequence[int], cover: Cover) -> Floats:
     now = response.min(axis=0) @ cover.demand
     gains = np.empty((len(movers), len(reach)))
     for row, mover in enumerate(movers):
-        others = np.delete(response, mover, axis=0).min(axis=0, initial=_UNREACHED)
-        gains[row] = now - np.minimum(others, reach) @ cover.demand
+        response_without = np.delete(response, mover, axis=0).min(axis=0, initial=_UNREACHED)
+        gains[row] = now - np.minimum(response_without, reach) @ cover.demand
     return gains

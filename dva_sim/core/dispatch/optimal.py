@@ -19,10 +19,10 @@ _OBJECTIVES: Final = ("eta", "distance")
 class BatchOptimal(Policy):
     """Serve as many tasks as possible, with the least total ETA for that number.
 
-    With more tasks than responders all tasks compete for who there is, so those near to somebody
-    go first. That alone could let a far one starve. So a second of waiting counts for a task
-    like `ageing_per_s` seconds less of way: whatever the ways are, who waits long enough wins.
-    Where all tasks can be served, or all have waited equally long, ageing changes nothing.
+    With more tasks than responders the tasks near a responder go first, so a distant one could
+    starve. Therefore a second of waiting counts for a task like `ageing_per_s` seconds less of
+    travel: whatever the distances, a task that waits long enough wins. If all tasks can be
+    served, or all have waited equally long, ageing changes nothing.
 
     No more robots are sent than operators are free.
 

@@ -12,7 +12,7 @@ from dva_sim.core.dispatch.greedy import Free, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
 from dva_sim.kernel.errors import ConfigError
 
-_SAME_TIME_S = 1e-6  # [s] times nearer than this are the same
+_SAME_TIME_S = 1e-6  # times nearer than this are the same [s]
 _INF = float("inf")
 _Step = tuple[int, int, float]  # event, unit, when it is sent [s]
 
@@ -112,19 +112,20 @@ class _Search:
         for response, event, unit, start in self._branches(left, free, last):
             back = start + float(self.busy[event, unit])
             later = (*free[:unit], back, *free[unit + 1 :])
-            others = tuple(e for e in left if e != event)
-            self._extend(others, later, cost + response, (*steps, (event, unit, start)))
+            remaining = tuple(e for e in left if e != event)
+            self._extend(remaining, later, cost + response, (*steps, (event, unit, start)))
 
     def _branches(
         self, left: tuple[int, ...], free: tuple[float, ...], last: float
     ) -> list[tuple[float, int, int, float]]:
-        """Response time, event, unit and start of all that could be sent next, after the last."""
+        """Return response time, event, unit and start of every unit that could be sent next."""
         branches = []
         for event in left:
             release = float(self.release[event])
             arrival = self.arrival[event].tolist()
             for unit, since in enumerate(free):
                 start = max(release, since)
+                # Only in order of time: every other order of the same departures is the same plan.
                 if start >= last and arrival[unit] < _INF:
                     branches.append((start + arrival[unit] - release, event, unit, start))
         return sorted(branches)

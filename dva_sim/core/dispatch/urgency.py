@@ -1,4 +1,4 @@
-"""The most urgent first: without and with taking somebody away from something less urgent."""
+"""Most urgent first, with and without redirecting responders from less urgent tasks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
 from dva_sim.kernel import options
 
-_ROUNDING = 1e-9  # severities that differ by the margin as people write it, 0.3 - 0.1 and 0.2
+_ROUNDING = 1e-9  # tolerance for severities that differ by exactly the margin, 0.3 - 0.1 and 0.2
 
 
 class PriorityEta(Policy):
@@ -36,15 +36,15 @@ class PriorityEta(Policy):
 
 
 class Preemptive(Policy):
-    """`priority_eta` with preemption: responders may be redirected to clearly more urgent tasks.
+    """`priority_eta` with preemption: clearly more urgent tasks may take a busy responder.
 
     It does so only if no idle responder can serve the task well: not at all, or much later. What
     is left behind waits again, and is seen as such by the next decision.
 
-    It cannot thrash. What counts for taking somebody away is severity alone, which never falls
-    during an event's life. So each redirection raises the severity of what a responder is under
-    way to by at least the margin, and nothing lowers it before it arrives: between two times of
-    being idle nobody is redirected more often than `1 / margin` times.
+    It cannot thrash. Redirection depends on severity alone, which never falls during an event's
+    life. So each redirection raises the severity of a responder's task by at least the margin,
+    and nothing lowers it before the responder arrives: between two idle times a responder is
+    redirected at most `1 / margin` times.
 
     Args:
         margin: Least difference in severity between the new task and the one left behind.
@@ -71,6 +71,7 @@ class Preemptive(Policy):
             idle = free.best(eta[task])
             before = (np.inf if idle is None else eta[task, idle]) - self.gain_s
             severity = situation.tasks[task].severity
+            # The best idle responder's arrival, less the gain that a redirection needs.
             busy = self._under_way(eta[task], left_behind, severity, before)
             if busy is not None:
                 left_behind[busy] = np.inf
@@ -91,7 +92,7 @@ class Preemptive(Policy):
 
 
 def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
-    """Return places of the tasks that wait; those of one urgency in the order they came."""
+    """Return indices of the waiting tasks; those of one urgency in the order they came."""
 
     def urgency(index: int) -> float:
         task = situation.tasks[index]
@@ -101,7 +102,7 @@ def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
 
 
 def _left_behind(situation: Situation) -> Floats:
-    """Return the severity of what each responder is under way to; infinite for who is idle."""
+    """Return the severity of each responder's task; infinite for an idle responder."""
     tasks = situation.tasks
     under_way = (r.engaged for r in situation.responders)
     return np.array([np.inf if task is None else tasks[task].severity for task in under_way])

@@ -77,16 +77,16 @@ class Borders:
 
     def _is_inside(self, place: m.Position) -> bool:
         """Return True for a place that this DVA serves, or just beyond its border."""
-        own = (region for region, _ in self.division.served())
-        is_near = any(self.division.outside(region, place) <= CROSSED_AFTER_M for region in own)
+        regions = (region for region, _ in self.division.served())
+        is_near = any(self.division.outside(region, place) <= CROSSED_AFTER_M for region in regions)
         return is_near or self.division.dva_at(place) == self.division.own
 
     def _is_free(self, entry: DeviceEntry) -> bool:
         device = entry.device.id_tag
         sessions = self.orders.sessions
-        held = device in sessions.permissions.grants or device in sessions.reserved
+        is_held = device in sessions.permissions.grants or device in sessions.reserved
         idle = entry.kind != ROBOT or entry.mode == "Idle"
-        return idle and not held and device not in self.orders.engaged
+        return idle and not is_held and device not in self.orders.engaged
 
     def _hand_over(self, entry: DeviceEntry, now: float) -> list[Send]:
         """Ask a device to register with the DVA of its place, if that one is there."""

@@ -41,8 +41,8 @@ class Division:
     forgotten: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        for region, line in self.lines.items():
-            self.claims.setdefault(region, Claim(1, line[0]))
+        for region, dvas in self.lines.items():
+            self.claims.setdefault(region, Claim(1, dvas[0]))
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -52,7 +52,7 @@ class Division:
     @property
     def home(self) -> str:
         """Name of the region that is this DVA's own, served by it or by another."""
-        return next(region for region, line in self.lines.items() if line[0] == self.own)
+        return next(region for region, dvas in self.lines.items() if dvas[0] == self.own)
 
     def served(self) -> Iterator[tuple[str, int]]:
         """Yield the regions that this DVA serves, with their epochs."""

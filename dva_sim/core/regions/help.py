@@ -100,11 +100,11 @@ class MutualHelp:
         orders.counters["help given"] += 1
         return DvaAnswer(sends=self.dispatcher.decide(now))
 
-    def copy_of(self, asker: str, number: int) -> Event | None:
+    def copy_of(self, peer: str, number: int) -> Event | None:
         """Return the open copy of an event of another DVA."""
         orders = self.dispatcher.orders
-        own = next((n for n, lent in self.copies.items() if lent == Lent(asker, number)), 0)
-        return orders.events.open.get(own)
+        copy = next((n for n, lent in self.copies.items() if lent == Lent(peer, number)), 0)
+        return orders.events.open.get(copy)
 
     def end(self, copy: Event, now: float) -> list[Send]:
         """Let those go who were lent: the asker needs no help any longer."""

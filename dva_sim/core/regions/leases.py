@@ -39,9 +39,9 @@ class Leases:
 
     def lapse(self, now: float) -> None:
         """End the permissions whose holders have not come within the time of a silence."""
-        held = {grant.session: grant for grant in self.sessions.permissions.grants.values()}
+        grants = {grant.session: grant for grant in self.sessions.permissions.grants.values()}
         for session, since in list(self._brought.items()):
-            grant = held.get(session)
+            grant = grants.get(session)
             holder = None if grant is None else self.registry.entries.get(grant.holder)
             if grant is None or (holder is not None and not holder.silent):
                 del self._brought[session]

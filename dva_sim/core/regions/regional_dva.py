@@ -48,7 +48,7 @@ class RegionalDva(Dva):
     def __init__(self, *args: Any, division: Division, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.division = division
-        index = [line[0] for line in division.lines.values()].index(division.own)
+        index = [dvas[0] for dvas in division.lines.values()].index(division.own)
         self.events.first = NUMBERS * index + LIFE * (division.life % (NUMBERS // LIFE))
         self.help = MutualHelp(division, self.dispatcher)
         self.borders = Borders(division, self.orders, self.help)
@@ -253,9 +253,9 @@ class RegionalDva(Dva):
 
     def _meet_stranger(self, robot: str, status: m.RobotStatus) -> None:
         """Keep a robot that acts under a session of another DVA from everybody until it is idle."""
-        held = robot in self.sessions.permissions.grants
+        is_held = robot in self.sessions.permissions.grants
         is_registered = robot in self.registry.entries
-        if is_registered and status.mode != "Idle" and not held:
+        if is_registered and status.mode != "Idle" and not is_held:
             self._strangers.add(robot)
             self.sessions.reserved.add(robot)
         elif robot in self._strangers:

@@ -60,15 +60,15 @@ class Returns:
 
     def take(self, body: m.GiveBack) -> DvaAnswer:
         """Serve the own region again, as the DVA that has served it wants."""
-        own = self.division.own
+        dva = self.division.own
         claim = self.division.claims.get(body.region)
-        if claim is None or body.epoch is None or self.division.lines[body.region][0] != own:
+        if claim is None or body.epoch is None or self.division.lines[body.region][0] != dva:
             return DvaAnswer(m.NOT_SUPPORTED, f"{body.region!r} is not the region of this DVA")
-        if body.epoch <= claim.epoch and claim != Claim(body.epoch, own):
+        if body.epoch <= claim.epoch and claim != Claim(body.epoch, dva):
             return DvaAnswer(m.STALE, f"the epoch of {body.region} is {claim.epoch}")
-        self.division.claims[body.region] = Claim(body.epoch, own)
+        self.division.claims[body.region] = Claim(body.epoch, dva)
         self.deputy.copies.pop(body.region, None)  # what is open is passed on
-        self.orders.counters["region taken back"] += claim.dva != own
+        self.orders.counters["region taken back"] += claim.dva != dva
         return DvaAnswer()
 
     def yielded(self, regions: list[str]) -> None:

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 class Missed:
     """Runs without confirmation under one level, at the hardest condition."""
 
-    line: Level
+    level: Level
     missed: int
     runs: int
 

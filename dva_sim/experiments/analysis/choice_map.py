@@ -163,12 +163,12 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         study: Study as the manifest holds it.
     """
     declared = study.get("map")
-    if not declared or view.line is None or view.over is None:
+    if not declared or view.series_factor is None or view.over is None:
         return None
     models = next((f for f in view.part.factors if f.name == declared["models"]), None)
     if models is None:
         return None
-    axes = (view.over, view.line, models)
+    axes = (view.over, view.series_factor, models)
     cells = _cells(view.part, view.part.grid(view.measure), axes)  # (g, c, m, persons, trials)
     is_loss = measure_called(view.measure).better == "small"
     losses = cells if is_loss else -cells
@@ -179,7 +179,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
     is_clear, is_same, high = _judged(losses, loss.argmin(axis=1), smallest)
     return ChoiceMap(
         measure=view.measure,
-        choice=view.line,
+        choice=view.series_factor,
         given=view.over,
         models=models,
         over=_words_for(models, study),
@@ -220,8 +220,8 @@ def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArr
     order = [names.index(factor.name) for factor in axes]
     rest = [n for n in range(grid.ndim) if n not in order]
     moved = np.transpose(grid, [*order, *rest])
-    others = len(names) - len(axes)
-    return np.asarray(moved.reshape(*moved.shape[:3], *moved.shape[3 + others :]))
+    remaining = len(names) - len(axes)
+    return np.asarray(moved.reshape(*moved.shape[:3], *moved.shape[3 + remaining :]))
 
 
 def _judged(

@@ -45,16 +45,16 @@ _OF_DRIVES = {"lost link": "link lost", "gave up": "given up", "refused": "given
 
 @dataclass(frozen=True)
 class Ended:
-    """Outcomes of the events of one line at one stop.
+    """Outcomes of the events of one series at one stop.
 
     Attributes:
-        line: Level of the factor that is compared.
+        level: Level of the factor that is compared.
         stop: Level of the factor along which it is followed.
         events: Number of events.
         shares: Share of each way by the horizon, in the order of `Endings.ways`.
     """
 
-    line: Level
+    level: Level
     stop: Level
     events: int
     shares: dict[str, Interval]
@@ -92,16 +92,16 @@ class Endings:
         late = self.time > self.horizon
         return tuple(w for w in WAYS if w == NOTHING or np.any((self.way == w) & ~late))
 
-    def under(self, line: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
+    def under(self, level: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
         """Select the events under these levels; other factors as in the answer `(n,)`."""
         view = self._view
         setting: Setting = dict(view.panels[0] if panel is None else panel)
-        setting |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        setting |= {f.name: v for f, v in ((view.series_factor, level), (view.over, stop)) if f}
         return self._grid.at(setting)
 
-    def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
+    def at(self, level: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Return shares by the horizon, each with its 95 % interval over persons."""
-        mask = self.under(line, stop, panel)
+        mask = self.under(level, stop, panel)
         ending = self.way[mask]
         time = self.time[mask]
         person = self._person[mask]
@@ -111,7 +111,7 @@ class Endings:
         shares = {w: incidence.causes.get(w, never) for w in self.ways} | {
             NOTHING: incidence.nothing
         }
-        return Ended(line, stop, len(person), shares)
+        return Ended(level, stop, len(person), shares)
 
     def difference(self, first: Level, second: Level, stop: Level) -> Interval:
         """Share confirmed by the horizon: first minus second, paired by person."""

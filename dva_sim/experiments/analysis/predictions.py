@@ -123,15 +123,15 @@ def _asked(
     prediction: Prediction, view: StudyView
 ) -> tuple[str, tuple[Level, Level], Setting] | None:
     """Return the factor, levels and place of the contrast; None where they were not run."""
-    if view.line is None:
+    if view.series_factor is None:
         return None
-    factor = prediction.factor or view.line.name
+    factor = prediction.factor or view.series_factor.name
     contrast = prediction.contrast or view.contrast
     where = dict(view.panels[0]) | ({view.over.name: view.stops[-1]} if view.over else {})
     where |= prediction.at
     levels = view.part.levels
-    if factor != view.line.name and view.contrast is not None:
-        where.setdefault(view.line.name, view.contrast[1])
+    if factor != view.series_factor.name and view.contrast is not None:
+        where.setdefault(view.series_factor.name, view.contrast[1])
     where.pop(factor, None)
     needed: list[tuple[str, Sequence[Level]]] = [(name, (level,)) for name, level in where.items()]
     if contrast is None or factor not in levels:

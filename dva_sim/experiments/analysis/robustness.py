@@ -70,14 +70,14 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
         return None
     of_cells = runs.reshape(*runs.shape[:-2], -1)
     delays = np.where(np.isinf(of_cells).any(axis=-1), math.inf, nan_mean(of_cells, axis=-1))
-    own = str(get(scenario, STRATEGY))
-    waits = _waiting(part, own, delays)
+    strategy = str(get(scenario, STRATEGY))
+    waits = _waiting(part, strategy, delays)
     outside = ~np.isnan(delays)
     for name in strategies:
         covered = np.full(delays.shape, bool(ranges(name)))
         for steering, share in (("closed", 1.0 - waits), ("waiting", waits)):
             covered &= (share <= RARE_SHARE) | _watched(delays, ranges(name, steering))
-        outside &= ~(_has(part, name, own) & covered)
+        outside &= ~(_has(part, name, strategy) & covered)
     return Support(delays, outside, "; ".join(map(_coverage, strategies)))
 
 
@@ -96,7 +96,7 @@ def _loop_delays(part: RunGrid) -> Floats | None:
     return None
 
 
-def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
+def _waiting(part: RunGrid, default: str, delays: Floats) -> Floats:
     """Return the share of the driving time that each cell's persons moved and waited.
 
     Where it is not measured, only persons of the strategy `move_and_wait` count as waiting. That
@@ -105,7 +105,7 @@ def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
     if part.has(WAITING):
         shares = part.grid(WAITING)
         return np.nan_to_num(nan_mean(shares.reshape(*shares.shape[:-2], -1), axis=-1))
-    return np.where(_has(part, "move_and_wait", own), 1.0, np.zeros(delays.shape))
+    return np.where(_has(part, "move_and_wait", default), 1.0, np.zeros(delays.shape))
 
 
 def _watched(delays: Floats, bands: Sequence[tuple[float, float]]) -> Marks:
@@ -116,9 +116,9 @@ def _watched(delays: Floats, bands: Sequence[tuple[float, float]]) -> Marks:
     return watched
 
 
-def _has(part: RunGrid, strategy: str, own: str) -> Marks:
-    """Mark the cells driven by a strategy; `own` is that of cells that set none."""
-    has = [setting.get(STRATEGY, own) == strategy for setting in part.settings()]
+def _has(part: RunGrid, strategy: str, default: str) -> Marks:
+    """Mark the cells driven by a strategy; `default` is that of cells that set none."""
+    has = [setting.get(STRATEGY, default) == strategy for setting in part.settings()]
     return np.array(has).reshape([len(f.levels) for f in part.factors])
 
 
@@ -246,14 +246,14 @@ def robustness_of(
             strategy.
     """
     declared = study.get("robustness")
-    if not declared or view.over is None or view.line is None or view.contrast is None:
+    if not declared or view.over is None or view.series_factor is None or view.contrast is None:
         return None
     strategies = tuple(declared["strategies"])
     at = tuple(declared["at"] or view.stops[-1:])
     factors = [
         *([Factor(STRATEGY, strategies)] if strategies else []),
         Factor(PARAMETERS, tuple(range(int(declared["sets"]) + 1))),
-        Factor(view.line.name, view.contrast),
+        Factor(view.series_factor.name, view.contrast),
         Factor(view.over.name, at),
     ]
     part = RunGrid(table, REPEATS, factors)
@@ -333,10 +333,10 @@ def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
 
 def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
     """Return the paired difference under one model; the reference run drops out of it."""
-    own = read.own(where)
+    mean = read.own(where)
     difference = read.difference(where)
     interval = (
-        interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
+        interval_of(difference) if mean is None else _beside(read.finding, at, difference - mean)
     )
     if interval is None:
         return None

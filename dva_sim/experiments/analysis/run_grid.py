@@ -84,8 +84,8 @@ class RunGrid:
         shape = [len(f.levels) for f in self.factors]
         codes = tuple(i[self._known] for i in self._index[: len(shape)])
         cells = np.ravel_multi_index(codes, shape) if shape else np.zeros(len(self), int)
-        known, first = np.unique(cells, return_index=True)
-        rows = dict(zip(known.tolist(), np.flatnonzero(self._known)[first].tolist(), strict=True))
+        numbers, first = np.unique(cells, return_index=True)
+        rows = dict(zip(numbers.tolist(), np.flatnonzero(self._known)[first].tolist(), strict=True))
         values = self.treated[column]
         return [values[rows[i]] if i in rows else None for i in range(math.prod(shape))]
 

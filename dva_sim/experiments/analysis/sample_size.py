@@ -164,13 +164,13 @@ def plans(
     claims = claims_of(study)
     named = contrasts_of(study)
     claimed = {claim.comparison for claim in claims.values()}
-    others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
+    unclaimed = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
     family = _families(study, claims, named)
-    in_any_case = decided is None and not claims and not others
+    in_any_case = decided is None and not claims and not unclaimed
     tests = [
         *_of_answer(view_of(study, runs), in_any_case),
         *_of_claims(study, runs, claims, named, family),
-        *_of_comparisons(study, runs, others, family),
+        *_of_comparisons(study, runs, unclaimed, family),
     ]
     return [_plan(test) for test in tests if test.name not in (decided or ())]
 
@@ -191,7 +191,7 @@ def _of_answer(view: StudyView | None, in_any_case: bool) -> Iterator[_Test]:
 
     The smallest is asked where most persons are needed among the stops that are open.
     """
-    if view is None or view.contrast is None or view.line is None:
+    if view is None or view.contrast is None or view.series_factor is None:
         return
     differences = view.difference(view.panels[0], *view.contrast)
     bands = band(differences, view.level)
@@ -266,8 +266,8 @@ def _of_claims(
         what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
         assumed = f"{quantity(mean, unit)}, as found"
         if law is not None:
-            other = claim.margin + abs(mean) if is_same else math.inf
-            yield _Test(name, what, assumed, law, distance, other)
+            distance_to_opposite = claim.margin + abs(mean) if is_same else math.inf
+            yield _Test(name, what, assumed, law, distance, distance_to_opposite)
 
 
 _CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same within "}
@@ -349,11 +349,11 @@ def _sides(contrast: Contrast, at: Setting) -> str:
 
 
 def _sides_of(view: StudyView, stop: int) -> str:
-    assert view.line is not None
+    assert view.series_factor is not None
     assert view.contrast is not None
     at = dict(view.panels[0]) | view.at_stop(stop)
     measure = measure_of(view.measure, view.part.name)
-    return _difference_text(view.line.name, view.contrast, measure, at)
+    return _difference_text(view.series_factor.name, view.contrast, measure, at)
 
 
 def _difference_text(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:

@@ -26,8 +26,8 @@ CALIBRATED = "nearest_idle"
 
 
 def is_dispatch(view: StudyView | None) -> bool:
-    """Return True if a study compares policies on timed shifts, one line each."""
-    if view is None or view.line is None or view.line.name != POLICY:
+    """Return True if a study compares policies on timed shifts, one series each."""
+    if view is None or view.series_factor is None or view.series_factor.name != POLICY:
         return False
     return view.part.has("response_mean_s") and view.part.has("bound_mean_s")
 
@@ -36,7 +36,7 @@ class Shifts:
     """The part that the answer speaks of; a shift is what is called a person elsewhere.
 
     Args:
-        view: Its lines are policies, its stops arrival rates.
+        view: Its series are policies, its stops arrival rates.
         events: Columns of the table `events`, if there is one.
 
     Attributes:
@@ -45,7 +45,7 @@ class Shifts:
 
     def __init__(self, view: StudyView, events: Table | None = None) -> None:
         self.view = view
-        self.policies = tuple(str(level) for level in view.lines)
+        self.policies = tuple(str(level) for level in view.series)
         self.stops = range(len(view.stops))
         self.events = RunGrid(events, view.part.name, view.part.factors) if events else None
 
@@ -64,7 +64,7 @@ class Shifts:
         """Return values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
         grid = self.view.part.grid(column)
         panel = self.view.panels[0]
-        curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.lines]
+        curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.series]
         return np.stack(curves, axis=1)
 
     def means(self, column: str) -> Floats:
@@ -95,8 +95,8 @@ class Shifts:
         over = self.view.over
         if over is None or over.name != INTENSITY or BEST in self.policies:
             return [None for _ in self.stops]
-        seen = self.means("load")[self.policies.index(self.calibrated)]
-        return [float(load) if np.isfinite(load) else None for load in seen]
+        loads = self.means("load")[self.policies.index(self.calibrated)]
+        return [float(load) if np.isfinite(load) else None for load in loads]
 
     @property
     def titles(self) -> list[str]:

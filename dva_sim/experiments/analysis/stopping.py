@@ -72,5 +72,5 @@ def _of_contrast(study: Study, contrast: Contrast, runs: Table, level: float) ->
     beside = [sides(product_of(part, name)) for name in covariates]
     means = adjusted_means(sides(part.grid(contrast.measure)), beside)
     ran = np.isfinite(sides(part.grid("cell"))[0]).any(axis=(1, 2))  # rows may leave stops out
-    seen = band(means[:, ran], level)
-    return np.asarray((seen.high - seen.low) / 2)
+    interval = band(means[:, ran], level)
+    return np.asarray((interval.high - interval.low) / 2)

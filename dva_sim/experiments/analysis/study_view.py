@@ -36,14 +36,14 @@ ROW = "row"  # name of the factor whose levels are the rows of a list
 
 @dataclass(frozen=True)
 class StudyView:
-    """View of a part: its factors as x axis, lines and panels.
+    """View of a part: its factors as x axis, series and panels.
 
     Attributes:
         part: The runs.
         measure: Column the question is about.
-        line: Factor with a line for each level, or None.
+        series_factor: Factor whose levels are the series of figures, or None.
         over: Factor along x, or None.
-        contrast: The two levels of `line` compared, the first minus the second; or None.
+        contrast: The two levels of `series_factor` compared, the first minus the second; or None.
         within: The panel that the answer speaks of.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
         outside: True for cells `(levels of factor 1, ...)` that are extrapolations, beyond the
@@ -56,7 +56,7 @@ class StudyView:
 
     part: RunGrid
     measure: str
-    line: Factor | None
+    series_factor: Factor | None
     over: Factor | None
     contrast: tuple[Level, Level] | None
     within: Setting
@@ -68,9 +68,9 @@ class StudyView:
     level: float = LEVEL
 
     @property
-    def lines(self) -> tuple[Level, ...]:
-        """Levels of the line factor; a single None where there is none."""
-        return self.line.levels if self.line else (None,)
+    def series(self) -> tuple[Level, ...]:
+        """Levels of the series factor; a single None where there is none."""
+        return self.series_factor.levels if self.series_factor else (None,)
 
     @property
     def stops(self) -> tuple[Level, ...]:
@@ -83,7 +83,7 @@ class StudyView:
 
         Settings that the design leaves out have no panel.
         """
-        names = [f.name for f in (self.line, self.over) if f]
+        names = [f.name for f in (self.series_factor, self.over) if f]
         every = list(self.part.settings(but=names))
         order = sorted(
             every, key=lambda panel: [self.within.get(*item) != item[1] for item in panel.items()]
@@ -100,9 +100,9 @@ class StudyView:
         """The greatest difference between two values that the measure can take."""
         return self.possible[1] - self.possible[0]
 
-    def setting(self, panel: Setting, line: Level) -> Setting:
-        """Return the levels that a line of a panel stands for."""
-        return dict(panel) | ({self.line.name: line} if self.line else {})
+    def setting(self, panel: Setting, level: Level) -> Setting:
+        """Return the levels that a series in a panel stands for."""
+        return dict(panel) | ({self.series_factor.name: level} if self.series_factor else {})
 
     def along_x(self) -> dict[str, Any]:
         """Return the levels along x under their factor's name.
@@ -115,9 +115,9 @@ class StudyView:
         """Return the level along x of one stop."""
         return {self.over.name: self.over.levels[stop]} if self.over else {}
 
-    def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
+    def curve(self, grid: Floats, panel: Setting, level: Level) -> Floats:
         """Return values along x as `(stops, persons, trials)`."""
-        values = self.part.where(grid, self.setting(panel, line))
+        values = self.part.where(grid, self.setting(panel, level))
         return values if self.over else values[np.newaxis]
 
     @property
@@ -125,13 +125,13 @@ class StudyView:
         """The measure as it is judged: in excess of the reference wherever there is one."""
         return self.part.outcome(self.measure)
 
-    def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
-        """Return the stops of a panel at which a line, of some or all, is an extrapolation."""
+    def stops_outside(self, panel: Setting, levels: Sequence[Level] | None = None) -> list[int]:
+        """Return the stops of a panel at which a series, of some or all, is an extrapolation."""
         if self.outside is None:
             return []
-        some = self.lines if lines is None else lines
+        series = self.series if levels is None else levels
         outside = np.asarray(self.outside, dtype=float)
-        marks = [self.part.where(outside, self.setting(panel, line)) > 0 for line in some]
+        marks = [self.part.where(outside, self.setting(panel, level)) > 0 for level in series]
         return [int(stop) for stop in np.flatnonzero(np.array(marks).any(axis=0))]
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
@@ -141,7 +141,7 @@ class StudyView:
         """
 
         def sides(grid: Floats) -> list[Floats]:
-            return [self.curve(grid, panel, line) for line in (first, second)]
+            return [self.curve(grid, panel, level) for level in (first, second)]
 
         beside = [sides(product_of(self.part, name)) for name in self.covariates]
         return adjusted_means(sides(self.values), beside)
@@ -326,21 +326,21 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     declared = declared or _only_answer(part)
     factor_by_name = {f.name: f for f in part.factors}
     over = factor_by_name.get(declared.get("over", ""))
-    line = factor_by_name.get(declared.get("factor", ""))
-    if over is None and not (line and "over" in declared):
-        free = [f for f in part.factors if f is not line]
+    factor = factor_by_name.get(declared.get("factor", ""))
+    if over is None and not (factor and "over" in declared):
+        free = [f for f in part.factors if f is not factor]
         numeric = [f for f in free if f.is_numeric and len(f.levels) > 1]
         longest = max(numeric, key=lambda f: len(f.levels), default=None)
         over = longest or next(iter(free), None)
-    line = line or next((f for f in part.factors if f is not over), None)
+    factor = factor or next((f for f in part.factors if f is not over), None)
     within = {k: v for k, v in (declared.get("within") or {}).items() if k in factor_by_name}
     measure = declared.get("measure") or _first_measure(part)
     return StudyView(
         part=part,
         measure=measure,
-        line=line,
+        series_factor=factor,
         over=over,
-        contrast=_contrast(declared, line),
+        contrast=_contrast(declared, factor),
         within=within,
         averages_points=POINT in study.get("factors", {}),
         covariates=tuple(covariates_of(study, part)[0]) if study.get("answer") else (),
@@ -368,14 +368,14 @@ def _only_answer(part: RunGrid) -> dict[str, Any]:
 
 def finding_of(view: StudyView) -> Finding | None:
     """Return the declared contrast, measured; None where no contrast was declared or run."""
-    if view.contrast is None or view.line is None:
+    if view.contrast is None or view.series_factor is None:
         return None
     panel = view.panels[0]
     bands = view.band_of(panel, *view.contrast)
     return Finding(
         measure=view.measure,
         in_excess=view.part.has_reference(view.measure),
-        factor=view.line.name,
+        factor=view.series_factor.name,
         first=view.contrast[0],
         second=view.contrast[1],
         over=view.over.name if view.over else "",
@@ -400,8 +400,8 @@ def finding_of(view: StudyView) -> Finding | None:
 def _usual(view: StudyView, level: Level) -> Floats:
     """Return the median of all runs under a level `(stops,)`; nan where there is none."""
     values = view.curve(view.part.grid(view.measure), view.panels[0], level)
-    seen = [present(runs) for runs in values]
-    return np.array([float(np.median(runs)) if len(runs) else math.nan for runs in seen])
+    present_runs = [present(runs) for runs in values]
+    return np.array([float(np.median(runs)) if len(runs) else math.nan for runs in present_runs])
 
 
 def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
@@ -426,13 +426,13 @@ def interval_of(values: Floats, level: float = LEVEL) -> Interval | None:
 
 
 def _missed(view: StudyView) -> tuple[Missed, ...]:
-    """Return runs without confirmation at the last stop, for every line."""
+    """Return runs without confirmation at the last stop, for every series."""
     if not view.part.has("confirmed"):
         return ()
     grid = view.part.grid("confirmed")
     panel = view.panels[0]
-    seen = [(level, present(view.curve(grid, panel, level)[-1])) for level in view.lines]
-    return tuple(Missed(level, int((runs < 1).sum()), len(runs)) for level, runs in seen)
+    runs_by_level = [(level, present(view.curve(grid, panel, level)[-1])) for level in view.series]
+    return tuple(Missed(level, int((runs < 1).sum()), len(runs)) for level, runs in runs_by_level)
 
 
 def _horizon(view: StudyView) -> float | None:
@@ -451,8 +451,8 @@ def _first_measure(part: RunGrid) -> str:
     return next(times, next(iter(measures), "seed"))
 
 
-def _contrast(declared: Mapping[str, Any], line: Factor | None) -> tuple[Level, Level] | None:
+def _contrast(declared: Mapping[str, Any], factor: Factor | None) -> tuple[Level, Level] | None:
     levels = tuple(declared.get("contrast") or ())
-    if line is None or len(levels) != 2 or not set(levels) <= set(line.levels):
+    if factor is None or len(levels) != 2 or not set(levels) <= set(factor.levels):
         return None
     return levels[0], levels[1]

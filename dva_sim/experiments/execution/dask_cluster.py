@@ -198,11 +198,11 @@ async def _kind_at(address: str) -> str:
 def _checked(task: Callable[P, R], ours: Versions, *args: P.args, **kwargs: P.kwargs) -> R:
     """Do the task on a worker, if it has the program wanted."""
     with _ONE_AT_A_TIME:
-        if other := differences(ours, versions()):
+        if mismatch := differences(ours, versions()):
             from distributed import get_worker
 
             raise OtherProgram(
-                f"worker {get_worker().address} has {other}; install the same there, "
+                f"worker {get_worker().address} has {mismatch}; install the same there, "
                 "and start it again"
             )
         if not _processes:

@@ -73,8 +73,8 @@ def record_study(
         job_by_name = {name_of(job): job for job in chosen(plan, rows)}
         folder = _tidied(out / FOLDER, job_by_name)
         rest = [job for name, job in job_by_name.items() if not (folder / name).exists()]
-        own = {measure.about.name for measure in plan.measures.values()}
-        prints = {name_of(job): _fingerprint(job, rows[job.address], own) for job in rest}
+        measures = {measure.about.name for measure in plan.measures.values()}
+        prints = {name_of(job): _fingerprint(job, rows[job.address], measures) for job in rest}
         done = len(job_by_name) - len(rest)
         total = len(job_by_name)
         progress(done, total)
@@ -202,9 +202,9 @@ class Rerun:
         return {}
 
 
-def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
+def _fingerprint(job: StudyJob, row: Row, measures: Iterable[str]) -> str:
     """Hash of a run's measures, without its design columns and the user's measures."""
-    inputs = {*DESIGN_COLUMNS, *job.levels, *own}
+    inputs = {*DESIGN_COLUMNS, *job.levels, *measures}
     return _print_of({name: value for name, value in row.items() if name not in inputs})
 
 

@@ -113,8 +113,8 @@ class StudySession:
         self._workers = workers
         self._watch = watch
         self._progress = progress
-        own = tuple(plan.measures)
-        self.episode: Simulate = partial(run_job, measures=own) if own else run_job
+        measures = tuple(plan.measures)
+        self.episode: Simulate = partial(run_job, measures=measures) if measures else run_job
         self.limit_s = scheduling.LIMIT_S
         self.count = len({job.key for job in plan.jobs} & journal.done())
         progress(self.count, plan.runs)
@@ -157,8 +157,8 @@ class StudySession:
 
     def table(self, batches: Sequence[Sequence[StudyJob]]) -> Frame:
         """Return the table `runs` of some batches, without repeats."""
-        own = [job for job in self.in_order(batches) if not job.is_repeat]
-        tables = ((job, self.journal.tables(job.key) or {}) for job in own)
+        originals = [job for job in self.in_order(batches) if not job.is_repeat]
+        tables = ((job, self.journal.tables(job.key) or {}) for job in originals)
         rows = (
             design_row(job) | row
             for job, run_tables in tables
@@ -300,9 +300,9 @@ class FileWatch:
     def _look(self) -> dict[str, Version]:
         """Return the version of each file by name."""
         folders = list(self._folders())
-        seen = tuple(map(version_of, folders))
+        folder_versions = tuple(map(version_of, folders))
         files = dict(self._files())
         versions = {name: version_of(path) for name, path in files.items()}
         self._places = (*folders, *files.values())
-        self._seen = (*seen, *versions.values())
+        self._seen = (*folder_versions, *versions.values())
         return versions

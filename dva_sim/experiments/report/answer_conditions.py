@@ -77,8 +77,8 @@ def _waiting(view: StudyView, finding: Finding) -> Iterator[str]:
         return
     grid = view.part.grid(_WAITING)
     sides = (finding.first, finding.second)
-    seen = [present(view.curve(grid, view.panels[0], side)[stop]) for side in sides]
-    shares = [float(values.mean()) for values in seen if len(values)]
+    runs = [present(view.curve(grid, view.panels[0], side)[stop]) for side in sides]
+    shares = [float(values.mean()) for values in runs if len(values)]
     if len(shares) == len(sides) and all(share < 1 for share in shares) and any(shares):
         for share, side in zip(shares, sides, strict=True):
             yield f"{percent(share)} of the time under {level_name(finding.factor, side)}"
@@ -87,8 +87,8 @@ def _waiting(view: StudyView, finding: Finding) -> Iterator[str]:
 def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
     """Return the answer under the other settings that were run, and what was not varied at all."""
     stop = telling_stop(finding)
-    others = view.panels[1:] if finding.within and stop is not None else []
-    differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in others]
+    other_panels = view.panels[1:] if finding.within and stop is not None else []
+    differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in other_panels]
     apart = [entry for entry in differences if np.isfinite(entry[1])]
     where = place(finding, [stop or 0])
     varied = {key.name for key in keys_of(reading.study)}
@@ -96,7 +96,7 @@ def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str
     values = {key: get(scenario, key) for key in reading.page.assumed if key not in varied}
     return sentence(
         "settings",
-        within=setting(finding.within) if others else "",
+        within=setting(finding.within) if other_panels else "",
         there=where and f" {where}",
         levels=other_levels(finding, len(apart)) if apart else "",
         means=[mean for _, mean, _, _ in apart],
@@ -123,8 +123,8 @@ def _difference(
 
 def _apart(panel: Setting, usual: Setting) -> str:
     """Return the levels of a panel that are not those of the answer."""
-    other = {name: level for name, level in panel.items() if level != usual.get(name)}
-    return brief(other) if TUNING in other else setting(other)
+    deviations = {name: level for name, level in panel.items() if level != usual.get(name)}
+    return brief(deviations) if TUNING in deviations else setting(deviations)
 
 
 def _assumptions(reading: ResultsReading, finding: Finding) -> str:
@@ -153,18 +153,18 @@ def repeated(robustness: RepeatedAnswer) -> list[str]:
 def _repeated_stop(robustness: RepeatedAnswer, stop: RepeatedStop) -> str:
     failed = []
     for name in robustness.strategies:
-        means = [other.mean for other in stop.others if other.strategy == name]
-        others = sum(not mean * stop.found > 0 for mean in means)
-        if others:
-            failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")
+        means = [repeat.mean for repeat in stop.others if repeat.strategy == name]
+        opposed = sum(not mean * stop.found > 0 for mean in means)
+        if opposed:
+            failed.append(f"{level_name(STRATEGY, name)} ({opposed} of {len(means)})")
     return sentence(
         "repeated_stop",
         stop=stop,
         level=f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}",
-        means=[other.mean for other in stop.others],
+        means=[repeat.mean for repeat in stop.others],
         unit=robustness.unit,
         failed=failed,
-        beyond=sum(other.is_beyond for other in stop.others),
+        beyond=sum(repeat.is_beyond for repeat in stop.others),
     )
 
 

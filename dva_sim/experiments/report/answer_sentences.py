@@ -32,7 +32,7 @@ def answer(finding: Finding) -> Answer:
         measure=measure_name(f.measure),
         factor=factor_name(f.factor),
         place=place(f, [len(f.levels) - 1]),
-        sides=[(level_name(f.factor, m.line), m) for m in f.missed],
+        sides=[(level_name(f.factor, m.level), m) for m in f.missed],
         waits=measure_called(f.measure).awaits == "confirmation",
     )
     stop = telling_stop(f)
@@ -202,10 +202,10 @@ def _limits(f: Finding, others: OtherRuns, stop: int | None = None) -> str:
         others: The contrast in other runs.
         stop: Stop whose own band and mean count as well; None: those of the others alone.
     """
-    own = slice(0) if stop is None else slice(stop, stop + 1)
-    low = min([others.low, *f.low[own]])
-    high = max([others.high, *f.high[own]])
-    means = [*others.means, *f.mean[own]]
+    stops = slice(0) if stop is None else slice(stop, stop + 1)
+    low = min([others.low, *f.low[stops]])
+    high = max([others.high, *f.high[stops]])
+    means = [*others.means, *f.mean[stops]]
     mean = f"mean{'s' if min(means) < max(means) else ''} {_range(min(means), max(means), f.unit)}"
     return f"{_range(low, high, f.unit)} (95 % limits; {mean})"
 

@@ -69,12 +69,12 @@ _MIN_PERSONS = 2
 
 def spread_table(view: StudyView) -> CellTable | None:
     """Spread between and within persons, in the panel that the answer speaks of."""
-    if view.contrast is None or view.line is None or len(view.part.trials) < _MIN_PERSONS:
+    if view.contrast is None or view.series_factor is None or len(view.part.trials) < _MIN_PERSONS:
         return None
     panel = view.panels[0]
     values = view.values
     first, second = (view.curve(values, panel, level) for level in view.contrast)
-    names = [level_name(view.line.name, level) for level in view.contrast]
+    names = [level_name(view.series_factor.name, level) for level in view.contrast]
     kinds = [(names[0], first), (names[1], second), (f"{names[0]} − {names[1]}", first - second)]
     rows = [
         [

@@ -237,12 +237,12 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     chosen = {(str(c.when), c.value) for c in tuned.chosen}
     rows = [
         [
-            *(level_name(name, level) for name, level in seen.when.items()),
-            f"{seen.value:g}",
-            f"{number(seen.mean)} ({number(seen.low)} to {number(seen.high)})",
-            "chosen" if (str(seen.when), seen.value) in chosen else "",
+            *(level_name(name, level) for name, level in trial.when.items()),
+            f"{trial.value:g}",
+            f"{number(trial.mean)} ({number(trial.low)} to {number(trial.high)})",
+            "chosen" if (str(trial.when), trial.value) in chosen else "",
         ]
-        for seen in tuned.seen
+        for trial in tuned.seen
     ]
     heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
     heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]

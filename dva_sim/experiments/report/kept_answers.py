@@ -201,9 +201,9 @@ def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
             if job.is_repeat:
                 continue
             raise ConfigError(f"{folder}: has no run {job.address} as it is now")
-        other = [c for c, value in row.items() if not _is_equal(runs[c][address], value)]
-        if other:
-            where = f"{other[0]} of run {job.address}"
+        columns = [c for c, value in row.items() if not _is_equal(runs[c][address], value)]
+        if columns:
+            where = f"{columns[0]} of run {job.address}"
             raise ConfigError(f"{folder}: this program gives another {where}; run the study again")
 
 

@@ -26,8 +26,8 @@ _MIN_RESAMPLED_PERSONS = 6  # persons: with fewer nothing can be drawn again
 
 def remarks(reading: Reading) -> list[str]:
     """Return remarks on study size, statistics and program version."""
-    own = reading.page.method(reading.pair_correlation) if reading.view else None
-    lines = _usual(reading) if own is None else own
+    remark_lines = reading.page.method(reading.pair_correlation) if reading.view else None
+    lines = _usual(reading) if remark_lines is None else remark_lines
     study = {"hypotheses": None, "comparisons": None} | reading.study
     tests = paragraphs("tests", study=study)
     size = [] if reading.by_people else [_size(reading)]

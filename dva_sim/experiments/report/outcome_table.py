@@ -73,7 +73,7 @@ def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
         for setting, ended in _rows(endings, view, panel, stop)
         if ended.events
     ]
-    names = [f.name for f in (view.over, view.line) if f is not None]
+    names = [f.name for f in (view.over, view.series_factor) if f is not None]
     if panels != view.panels[:1]:
         names = [*view.panels[0], *names]
     factors = [factor_name(name) for name in names]
@@ -96,7 +96,7 @@ def _places(
         (panel, stop)
         for panel in panels
         for stop in view.stops
-        if not _all_right(endings, view.lines, stop, panel)
+        if not _all_right(endings, view.series, stop, panel)
     ]
 
 
@@ -106,9 +106,9 @@ def _rows(
     """Yield each line there, with the levels that name it."""
     named = list(panel.items()) if panel != view.panels[0] else []
     named += [(view.over.name, stop)] if view.over else []
-    for line in view.lines:
-        own = [(view.line.name, line)] if view.line else []
-        yield [*named, *own], endings.at(line, stop, panel)
+    for level_of_series in view.series:
+        level = [(view.series_factor.name, level_of_series)] if view.series_factor else []
+        yield [*named, *level], endings.at(level_of_series, stop, panel)
 
 
 def _level(named: tuple[str, Level]) -> str:
@@ -116,14 +116,14 @@ def _level(named: tuple[str, Level]) -> str:
 
 
 def _all_right(
-    endings: Endings, lines: Sequence[Level], stop: Level, panel: Setting | None = None
+    endings: Endings, levels: Sequence[Level], stop: Level, panel: Setting | None = None
 ) -> bool:
-    return all(bool(endings.is_right[endings.under(line, stop, panel)].all()) for line in lines)
+    return all(bool(endings.is_right[endings.under(level, stop, panel)].all()) for level in levels)
 
 
 def _side(view: StudyView, ended: Ended) -> str:
     """Return `REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
-    name = level_name(view.line.name, ended.line) if view.line else "all"
+    name = level_name(view.series_factor.name, ended.level) if view.series_factor else "all"
     clauses = [
         f"{ending} {_share(share)}"
         for ending, share in ended.shares.items()
@@ -195,15 +195,15 @@ def outcomes_of(events: Mapping[str, NDArray[Any]]) -> EventOutcomes | None:
         return None
     real = np.asarray(events["is_true"]) == True  # noqa: E712  (True, False or missing)
     outcome = np.asarray(events["outcome"])
-    seen = np.isin(outcome, _SEEN)
+    confirmed = np.isin(outcome, _SEEN)
     missed = real & (outcome == "refuted")
     kinds = np.asarray(events["kind"])
     whose = np.asarray(events["responder_kind"])
     return EventOutcomes(
         real=int(real.sum()),
-        confirmed=int((real & seen).sum()),
+        confirmed=int((real & confirmed).sum()),
         missed=Counter(zip(map(str, kinds[missed]), map(str, whose[missed]), strict=True)),
-        left=Counter(map(str, outcome[real & ~seen & ~missed])),
+        left=Counter(map(str, outcome[real & ~confirmed & ~missed])),
         false_alarms=int((~real).sum()),
-        believed=int((~real & seen).sum()),
+        believed=int((~real & confirmed).sum()),
     )

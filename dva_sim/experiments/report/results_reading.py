@@ -209,8 +209,8 @@ class ResultsReading:
 
     def trials_of(self, part: str) -> int:
         """Return trials per person in a part; 0 if unknown."""
-        own = (self.study.get("parts", {}).get(part) or {}).get("replications")
-        return int(own or self.study.get("replications") or 0)
+        trials = (self.study.get("parts", {}).get(part) or {}).get("replications")
+        return int(trials or self.study.get("replications") or 0)
 
 
 PAGES: dict[str, type[ModelPage]] = {

@@ -147,8 +147,8 @@ class Reading(ResultsReading):
         if self.view is None:
             return []
         parts = parts_of(self.study, self.runs)
-        own = [self._cells_of(part, self.view) for part in parts if len(part)]
-        return [table for table in (*own, *self.page.beside()) if table.rows]
+        tables = [self._cells_of(part, self.view) for part in parts if len(part)]
+        return [table for table in (*tables, *self.page.beside()) if table.rows]
 
     def _cells_of(self, part: RunGrid, view: StudyView) -> CellTable:
         page = self.page
@@ -243,12 +243,12 @@ def in_context(reading: ResultsReading) -> Finding | None:
     if view is None or finding is None or (stop := telling_stop(finding)) is None:
         return finding
     stops = reading.robustness.stops if reading.robustness is not None else ()
-    others = [r for s in stops if s.level == finding.levels[stop] for r in s.others]
+    repeats = [r for s in stops if s.level == finding.levels[stop] for r in s.others]
     bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
     differences = [(float(b.mean[stop]), float(b.low[stop]), float(b.high[stop])) for b in bands]
     return replace(
         finding,
-        models=_together(finding.mean[stop], [(r.mean, r.low, r.high) for r in others]),
+        models=_together(finding.mean[stop], [(r.mean, r.low, r.high) for r in repeats]),
         elsewhere=_together(
             finding.mean[stop], [each for each in differences if np.isfinite(each[0])]
         ),
@@ -267,7 +267,7 @@ def only_model(reading: ResultsReading, part: str) -> str:
     return f"strategy {level_name(STRATEGY, strategy)}"
 
 
-def _together(own: float, differences: list[tuple[float, float, float]]) -> OtherRuns | None:
+def _together(mean: float, differences: list[tuple[float, float, float]]) -> OtherRuns | None:
     """Return the outer limits of intervals, and the range of their means; None without any."""
     if not differences:
         return None
@@ -277,7 +277,7 @@ def _together(own: float, differences: list[tuple[float, float, float]]) -> Othe
         high=max(highs),
         means=(min(means), max(means)),
         count=len(differences),
-        turns=any(high < 0 if own > 0 else low > 0 for _, low, high in differences),
+        turns=any(high < 0 if mean > 0 else low > 0 for _, low, high in differences),
     )
 
 

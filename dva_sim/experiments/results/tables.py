@@ -51,9 +51,9 @@ def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) ->
     try:
         target.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".tables-", dir=folder) as name:
-            own = [job for job in jobs if not job.is_repeat]
+            originals = [job for job in jobs if not job.is_repeat]
             repeats = [job for job in jobs if job.is_repeat]
-            made = _write(Path(name), own, tables_of)
+            made = _write(Path(name), originals, tables_of)
             made += _write(
                 Path(name), repeats, lambda key: {REPEATS: (tables_of(key) or {}).get("runs", [])}
             )
@@ -122,13 +122,13 @@ class _Table:
     Args:
         folder: Folder of its file, and meanwhile of its database.
         name: Its name.
-        seen: Columns already known, in order; further ones are found in rows.
+        types_of_columns: Columns already known, in order; further ones are found in rows.
     """
 
-    def __init__(self, folder: Path, name: str, seen: Columns) -> None:
+    def __init__(self, folder: Path, name: str, types_of_columns: Columns) -> None:
         self._folder = folder
         self._name = name
-        self._seen = {column: set(types) for column, types in seen.items()}
+        self._seen = {column: set(types) for column, types in types_of_columns.items()}
         self._waiting: list[Row] = []
         self._kinds: dict[str, str] = {}  # of the table in the database, once it is made
         self._fits = True

@@ -172,9 +172,9 @@ def cells(study: Study, inputs: StudyInputs | None = None) -> list[DesignCell]:
     inputs = inputs or StudyInputs(study)
     refuse_unknown_measures(inputs)
     _at_ends(inputs)
-    own = [cell for name in study.parts for cell in _cells_of(inputs, name)]
-    _refuse_impossible_measures(inputs, own)
-    return [*own, *_repeats_of(inputs)]
+    made = [cell for name in study.parts for cell in _cells_of(inputs, name)]
+    _refuse_impossible_measures(inputs, made)
+    return [*made, *_repeats_of(inputs)]
 
 
 def refuse_unknown_measures(inputs: StudyInputs) -> None:
@@ -186,8 +186,8 @@ def refuse_unknown_measures(inputs: StudyInputs) -> None:
     study = inputs.study
     for path, part, measure in _asked_measures(study):
         source = inputs.scenarios[part]
-        own = inputs.measures_of(str(source.data.get("model", "full")))
-        measures = [*model_of(source).measures(), *own]
+        plugins = inputs.measures_of(str(source.data.get("model", "full")))
+        measures = [*model_of(source).measures(), *plugins]
         if measure in COVARIATES and measure not in measures:
             problem = f"{measure!r} is measured where the key 'measures' names it"
             raise study.error(problem, path)
@@ -200,8 +200,8 @@ def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]
     study = inputs.study
     for path, part, measure in _asked_measures(study):
         made = [c.scenario for c in every if c.part == part and c.cell != REFERENCE]
-        own = inputs.measures_of(made[0].model) if made else []
-        possible = [[*model_for(scenario).measures(scenario), *own] for scenario in made]
+        plugins = inputs.measures_of(made[0].model) if made else []
+        possible = [[*model_for(scenario).measures(scenario), *plugins] for scenario in made]
         if not any(measure in names for names in possible):
             problem = f"no run of part {part!r} has a value of the measure {measure!r}"
             raise study.error(f"{problem}; it has: {listed(possible[0])}", path)
@@ -325,9 +325,9 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
         traits = inputs.parameter_sets[int(str(levels[PARAMETERS]))]
         chosen = {factor: level for factor, level in levels.items() if factor != PARAMETERS}
         changes = _changes(inputs, fixed | chosen)
-        own = {*study.parts[study.answer.part].changes, *study.changes, *changes}
+        set_keys = {*study.parts[study.answer.part].changes, *study.changes, *changes}
         drawn = {f"{TRAITS}.{name}": value for name, value in traits.items()}
-        changes |= {key: value for key, value in drawn.items() if key not in own}
+        changes |= {key: value for key, value in drawn.items() if key not in set_keys}
         yield _cell(inputs, REPEATS, cell, levels, changes)
 
 

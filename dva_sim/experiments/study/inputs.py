@@ -45,8 +45,8 @@ def own_columns(measures: Iterable[RunMeasure]) -> dict[str, Any]:
     Args:
         measures: Measures that the study itself defines.
     """
-    own = {measure.about.name: measure.about.as_json() for measure in measures}
-    return {"runs": own} if own else {}
+    columns = {measure.about.name: measure.about.as_json() for measure in measures}
+    return {"runs": columns} if columns else {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -204,8 +204,8 @@ class StopRule(Config):
 
     @model_validator(mode="after")
     def _looks_at_one_thing(self) -> StopRule:
-        given = (self.measure is not None, self.part is not None)
-        if given != (self.comparison is None,) * 2:
+        is_measured = (self.measure is not None, self.part is not None)
+        if is_measured != (self.comparison is None,) * 2:
             raise ValueError("should name a comparison, or a measure and its part")
         if self.is_scheduled and self.comparison != ANSWER:
             raise ValueError("batch_persons: double is for the comparison 'answer'")

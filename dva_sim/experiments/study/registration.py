@@ -210,9 +210,9 @@ def departures(registered: Preregistration, study: Study) -> Iterator[str]:
     keys = [key for key in {**registered.plan, **now} if registered.plan.get(key) != now.get(key)]
     for key in (key for key in keys if key in ("persons", "replications")):
         yield f"{registered.plan.get(key)} {key} were registered, not {now[key]}"
-    others = [key for key in keys if key not in ("persons", "replications")]
-    if others:
-        yield f"other than registered: {', '.join(others)}"
+    changed = [key for key in keys if key not in ("persons", "replications")]
+    if changed:
+        yield f"other than registered: {', '.join(changed)}"
 
 
 def _remarks(registered: Preregistration, study: Study) -> Iterator[str]:

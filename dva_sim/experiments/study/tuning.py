@@ -104,8 +104,12 @@ class TunedValues(Config):
 
     def remark(self, now: TuningBasis) -> str:
         """Return the remark that persons or phones have changed since the tuning; empty if not."""
-        others = " and ".join(self.basis.unlike(now))
-        return f"tuned with other {others}: run 'dva-sim tune {self.study}' again" if others else ""
+        differences = " and ".join(self.basis.unlike(now))
+        return (
+            f"tuned with other {differences}: run 'dva-sim tune {self.study}' again"
+            if differences
+            else ""
+        )
 
     def value_for(self, levels: Mapping[str, Level]) -> float:
         """Return the value chosen for the cell with these levels.

@@ -270,15 +270,15 @@ def _ping_output(path: str, lines: list[tuple[int, str]]) -> DelayLog:
             runs.append(_Run())
             continue
         reply = _REPLY.match(text)
-        other = _NO_REPLY.match(text)
+        missing = _NO_REPLY.match(text)
         if reply is not None:
             delay = parse_delay(reply[3], path, line)
             sent = float(reply[1]) - delay
             if runs[-1].is_over(int(reply[2]), sent):
                 runs.append(_Run())
             runs[-1].replies.setdefault(runs[-1].count(int(reply[2])), (sent, delay))
-        elif other is not None:
-            runs[-1].count(int(other[1]))
+        elif missing is not None:
+            runs[-1].count(int(missing[1]))
         else:
             problem = f"should be a reply as printed by ping -D, not {text[:40]!r}"
             raise ConfigError(problem, path, line, 1)

@@ -208,10 +208,10 @@ class _Broker:
 
     def _refuse_taken_port(self) -> None:
         """Say so now: who waits for the broker would take another program for it."""
-        with socket.socket() as one:
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
-                one.bind(self._place)
+                probe.bind(self._place)
             except OSError as error:
                 at = ":".join(map(str, self._place))
                 problem = f"{PROGRAM} cannot listen at {at}: {error.strerror}"

@@ -97,11 +97,11 @@ class Feedback:
             Datagrams that are lost, as this one shows.
         """
         gone: list[int] = []
-        for number, held in echoes:
+        for number, hold in echoes:
             sent = self._pending.pop(number, None)
             if sent is not None:
                 self._heard = now
-                self.samples.append(now - sent - held)
+                self.samples.append(now - sent - hold)
                 self.round_trips.add(self.samples[-1])
                 # Earlier datagrams count as lost once enough later ones were acknowledged.
                 earlier = [n for n in self._pending if n < number]

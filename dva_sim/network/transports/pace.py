@@ -48,13 +48,13 @@ class Aimd:
         self.rate = 1.0 / round_trip
         self._least = self._last = round_trip
 
-    def passed(self, round_trip: float, held: bool) -> None:
-        """Take in a round trip [s] without loss; `held`: the gap held something back in it."""
+    def passed(self, round_trip: float, is_held: bool) -> None:
+        """Take in a round trip [s] without loss; `is_held`: the gap held something back in it."""
         self._least = min(self._least, round_trip)
         self._last = round_trip
         if round_trip - self._least > self.tolerance:
             self.lost()
-        elif held:
+        elif is_held:
             self.rate += self.increase / round_trip
 
     def lost(self) -> None:

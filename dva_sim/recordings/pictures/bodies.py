@@ -121,10 +121,10 @@ class _Ghost:
         index = bisect_right(self._times, time) - 1
         if index < 0 or time - self._times[index] > FRESH_FOR_S:
             return []
-        seen = self._views[index]
-        heading = math.degrees(seen.heading)
-        self._ring.center = seen.x, seen.y
-        self._cone.set_center((seen.x, seen.y))
+        view = self._views[index]
+        heading = math.degrees(view.heading)
+        self._ring.center = view.x, view.y
+        self._cone.set_center((view.x, view.y))
         self._cone.set_theta1(heading - self._half)
         self._cone.set_theta2(heading + self._half)
         return [self._cone, self._ring]

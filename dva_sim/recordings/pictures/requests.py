@@ -69,8 +69,8 @@ class Wanted:
     @property
     def is_plain_still(self) -> bool:
         """True if one drawing is requested, without a particular moment or camera."""
-        others = (self.video, self.at, self.camera)
-        return self.still is not None and all(other is None for other in others)
+        options = (self.video, self.at, self.camera)
+        return self.still is not None and all(other is None for other in options)
 
     def check(self, scenario: Scenario) -> None:
         """Refuse what no run of a scenario has.

@@ -72,8 +72,8 @@ def seconds(time: float) -> str:
     return f"{time:.0f} s" if time >= 10.0 else f"{time:.1f} s"
 
 
-def _lead(own: float, other: float) -> float:
-    return 0.0 if own == other else other - own
+def _lead(time: float, reference: float) -> float:
+    return 0.0 if time == reference else reference - time
 
 
 def _verdict(run: Playback) -> RunVerdict:

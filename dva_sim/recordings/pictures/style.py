@@ -79,8 +79,8 @@ def legend(moments: Iterable[Moments]) -> list[Artist]:
     for title, hazard in sorted(looks.items()):
         handles.append(_dot(hazard.mark, hazard.colour, title))
     if any(run.recording.recorder.views for run in runs):
-        seen = "as the operator sees it"
-        handles.append(_dot("o", "none", seen, GHOST))
+        label = "as the operator sees it"
+        handles.append(_dot("o", "none", label, GHOST))
     handles += _fields({what for run in runs for what in run.shown})
     return handles
 

@@ -139,13 +139,13 @@ def make_core(stage: Stage, permissions: Permissions, number: int = 1, life: int
     )
 
 
-def _division(stage: Stage, own: str, life: int) -> Division:
+def _division(stage: Stage, dva: str, life: int) -> Division:
     """Return the division of the site, as the DVA with this id knows it at first."""
     plan = stage.regions
     assert plan is not None, "one DVA serves everything"
     to_xy = stage.site.frame.to_xy
     return Division(
-        own,
+        dva,
         {name: stage.dvas_for(name) for name in plan.names},
         lambda place: plan.region_at(*to_xy(place.latitude, place.longitude)),
         lambda region, place: plan.outside(region, *to_xy(place.latitude, place.longitude)),

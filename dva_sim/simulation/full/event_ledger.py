@@ -377,10 +377,10 @@ class EventLedger:
             if kind != was or (place != before and apart(place, before) > MAX_MOVE_M):
                 yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*events.open.values(), *events.closed.values())
-        seen = self._seen
+        past = self._seen
         self._seen = {}
         for event in every:
-            old = seen.get(event.number)
+            old = past.get(event.number)
             if old is None and last > -math.inf and self._was_known(event.number):
                 old = self._adopted(event, now)
             if old is not None and old.is_over and not event.open and old.times == event.times:
@@ -451,9 +451,9 @@ class EventLedger:
 
     def _is_anothers(self, device: str) -> bool:
         """Return True if a device has registered with another DVA since it did with this one."""
-        own = self._registered.get(device, -math.inf)
-        others = (book._registered.get(device, -math.inf) for book in self._books)
-        return any(when > own for when in others)
+        registered = self._registered.get(device, -math.inf)
+        registrations = (book._registered.get(device, -math.inf) for book in self._books)
+        return any(when > registered for when in registrations)
 
     def _may_be_gone(self, number: int, kind: str, place: m.Position) -> bool:
         """Return True if another DVA has such an event, or nobody was told that one has a copy.
@@ -463,10 +463,10 @@ class EventLedger:
         if len(self._books) > 1 and self._word(number).found:
             return True
         near = max(self._rules.merge_distance, SAME_SPOT)
-        others = [book for book in self._books if book is not self]
-        if not all(book._worked_since(self._down_at - SIMULTANEOUS_S) for book in others):
+        other_books = [book for book in self._books if book is not self]
+        if not all(book._worked_since(self._down_at - SIMULTANEOUS_S) for book in other_books):
             return True  # that a DVA and its deputy die at once is not promised to be harmless
-        tables = [book._events for book in others]
+        tables = [book._events for book in other_books]
         all_events: list[Event | m.EventReport] = [*self._unreplicated]
         all_events += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
         return any(e.kind == kind and apart(e.position, place) < near for e in all_events)
@@ -484,9 +484,9 @@ class EventLedger:
 
     def _let_no_time_pass(self, passed: float) -> None:
         """Shift all deadlines: a DVA that was silenced decides nothing meanwhile."""
-        for number, seen in self._seen.items():
-            self._seen[number] = seen._replace(
-                since=seen.since + passed, waits=seen.waits + passed, began=seen.began + passed
+        for number, state in self._seen.items():
+            self._seen[number] = state._replace(
+                since=state.since + passed, waits=state.waits + passed, began=state.began + passed
             )
 
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
@@ -499,10 +499,10 @@ class EventLedger:
             self._held_since[right] = since
             silent = now - max(since, self._heard.get(right.holder, since))
             if right.holder != self._dva and silent > SILENT_AFTER + PENDING_SLACK:
-                held = f"{self._name(right.holder)} hold {self._name(right.robot)}"
+                right_text = f"{self._name(right.holder)} hold {self._name(right.robot)}"
                 yield (
                     "S2",
-                    f"lets {held}, of whom nothing is heard for {silent:.0f} s",
+                    f"lets {right_text}, of whom nothing is heard for {silent:.0f} s",
                 )
 
     def _check_informed(
@@ -513,14 +513,14 @@ class EventLedger:
         Time in which the robot is not heard does not count, nor does that of a silenced DVA. A
         robot also learns of it by a new session for its holder, and from a report of its holder.
         """
-        held = {(right.robot, right.holder) for right in rights}
+        pairs = {(right.robot, right.holder) for right in rights}
         for right in before:
-            if right.holder != self._dva and (right.robot, right.holder) not in held:
+            if right.holder != self._dva and (right.robot, right.holder) not in pairs:
                 self._uninformed.setdefault(right, now)
         for right, since in list(self._uninformed.items()):
             is_there = now - self._heard.get(right.robot, now) < SILENT_AFTER / 2
             is_told = right.session in self._informed or self._is_anothers(right.robot)
-            if is_told or (right.robot, right.holder) in held:
+            if is_told or (right.robot, right.holder) in pairs:
                 del self._uninformed[right]
             elif not works or not is_there:
                 self._uninformed[right] = now
@@ -552,8 +552,8 @@ class EventLedger:
             reported = self._promised[event.number]
             yield "S6", f"event {event.number} has lost its severity of {reported:g}"
         if new.hands and now - new.since > rules.order_limit + PENDING_SLACK:
-            held = now - new.since
-            yield "S6", f"event {event.number} is in one pair of hands for {held:.0f} s"
+            duration = now - new.since
+            yield "S6", f"event {event.number} is in one pair of hands for {duration:.0f} s"
         yield from self._of_debt(event, new.debt, now)
         for finding in new.found - (old.found if old else frozenset()):
             if not self._is_found(event, finding, now):
@@ -638,10 +638,10 @@ class EventLedger:
         return old if is_same and not moved else Debt(device, step, now, place)
 
     def _has_others(self, device: str, number: int) -> bool:
-        others = (
+        numbers = (
             n for n, word in self._words.items() if device in word.ordered.keys() - word.ended
         )
-        return any(other != number for other in others)
+        return any(other != number for other in numbers)
 
     def _is_found(self, event: Event, finding: str, now: float) -> bool:
         """Return True if a device sent there has said so, or a robot nearby may have sensed it."""

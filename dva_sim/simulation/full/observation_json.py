@@ -53,11 +53,13 @@ def _read_arrived(time: float, content: Mapping[str, Any]) -> o.Arrived:
 
 
 def _write_moves(fact: o.MotionNews) -> Plain:
-    return {"motions": [_write_motion(robot, one) for robot, one in fact.motions.items()]}
+    return {"motions": [_write_motion(robot, motion) for robot, motion in fact.motions.items()]}
 
 
 def _read_moves(time: float, content: Mapping[str, Any]) -> o.MotionNews:
-    return o.MotionNews(time, {one["robot"]: _read_motion(one) for one in content["motions"]})
+    return o.MotionNews(
+        time, {motion["robot"]: _read_motion(motion) for motion in content["motions"]}
+    )
 
 
 def _write_motion(robot: str, motion: o.RobotMotion) -> Plain:

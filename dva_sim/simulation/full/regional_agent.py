@@ -112,13 +112,13 @@ class RegionalDvaAgent(DvaAgent):
     ) -> None:
         """Ask another DVA; one that was started again has to know this one first."""
 
-        def known(reply: m.Reply) -> None:
+        def peer_answered(reply: m.Reply) -> None:
             if reply.code == m.NOT_REGISTERED:
                 self._ask_again(peer, body, answered, failed)
             else:
                 answered(reply)
 
-        self.device.ask(peer, body, known, failed)
+        self.device.ask(peer, body, peer_answered, failed)
 
     def _ask_again(
         self,

@@ -131,8 +131,8 @@ class RegionalRules:
             message = decode_if_valid(payload)
             if message is not None and isinstance(message.body, m.Reply):
                 order = self._ordered.pop((source, to, message.body.answers), None)
-                own = [] if order is None else [order.obeyed, self._obeys.get(source)]
-                obeyed = [dva for dva in own if dva is not None]
+                candidates = [] if order is None else [order.obeyed, self._obeys.get(source)]
+                obeyed = [dva for dva in candidates if dva is not None]
                 if message.body.code == m.OK and obeyed and to not in obeyed:
                     yield "S12", f"obeys {to}, and is registered with {obeyed[-1]}"
 
@@ -161,9 +161,9 @@ class RegionalRules:
             region = self.region_at(order.position)
             epoch, since = self._epochs.get((dva, region), (0, when))
             is_help = order.event_id in page.copies
-            own = page.served.get(region, 0)
-            if epoch > own > 0 and when - since > OBEYS_WITHIN and not is_help:
-                yield "S12", f"sends somebody in {region} by epoch {own}, and knows of {epoch}"
+            served = page.served.get(region, 0)
+            if epoch > served > 0 and when - since > OBEYS_WITHIN and not is_help:
+                yield "S12", f"sends somebody in {region} by epoch {served}, and knows of {epoch}"
 
     # --- what the books show ---------------------------------------------------------------
 
@@ -224,8 +224,8 @@ class RegionalRules:
                 continue
             if self._since[key] < math.inf:
                 self._since[key] = math.inf  # it is judged once
-                own = (*other.events.open.values(), *other.events.closed.values())
-                has = (e for e in own if e.number not in other.copies and e.kind == event.kind)
+                events = (*other.events.open.values(), *other.events.closed.values())
+                has = (e for e in events if e.number not in other.copies and e.kind == event.kind)
                 near = (e for e in has if apart(e.position, event.position) < self._near)
                 if number not in page.copies and all(e.state is State.EXPIRED for e in near):
                     yield "S13", f"has let go of event {number}, which {by} does not have"

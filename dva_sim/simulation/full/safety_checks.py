@@ -215,9 +215,9 @@ class Witness:
     questions: deque[int] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
 
-    def given(self, session: int, held: Held) -> None:
+    def given(self, session: int, right: Held) -> None:
         """Note that the DVA gives a permission, or says that one holds."""
-        self.sessions[session] = held
+        self.sessions[session] = right
         if len(self.sessions) > MAX_KEPT:
             forgotten, _ = self.sessions.popitem(last=False)
             self.over.pop(forgotten, None)
@@ -225,8 +225,8 @@ class Witness:
 
     def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
         """Return why a device must not act, or None."""
-        held = self.sessions.get(session or 0)
-        if held is None or held.holder != source or not held.allows(level):
+        right = self.sessions.get(session or 0)
+        if right is None or right.holder != source or not right.allows(level):
             return "S5", f"obeys {source}, who has no permission for {level}"
         if session not in self.confirmed:
             return "S5", f"obeys {source}, whose permission the DVA has not confirmed"
@@ -236,8 +236,8 @@ class Witness:
 
     def holder(self) -> str | None:
         """Return the holder of a confirmed session whose end the robot has not heard."""
-        held = (s for s in self.sessions if s in self.confirmed and s not in self.over)
-        return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
+        sessions = (s for s in self.sessions if s in self.confirmed and s not in self.over)
+        return next((h.holder for h in map(self.sessions.get, sessions) if h and h.drives), None)
 
     def in_hand(self, now: float) -> bool:
         """Return True while somebody drives it by hand who was heard within the lease."""
@@ -588,13 +588,13 @@ class SafetyAudit:
             return
         if witness.over.get(content.session, -math.inf) > witness.asked:
             return
-        held = Held(content.device, content.level, content.sensors)
-        witness.given(content.session, held)
+        right = Held(content.device, content.level, content.sensors)
+        witness.given(content.session, right)
         witness.over.pop(content.session, None)
         witness.confirmed.add(content.session)
-        if held.drives:
-            for session, other in witness.sessions.items():
-                if session != content.session and other.drives:
+        if right.drives:
+            for session, earlier in witness.sessions.items():
+                if session != content.session and earlier.drives:
                     _end(witness, session, now + witness.obeys_within)
 
     def _answered(
@@ -628,12 +628,12 @@ class SafetyAudit:
                 yield broken
             witness.ends(level, now)
         elif isinstance(body, m.DevSub):
-            held = witness.sessions.get(message.session or 0)
+            right = witness.sessions.get(message.session or 0)
             mine = (
-                held is not None
+                right is not None
                 and message.session in witness.confirmed
-                and held.holder == message.source
-                and body.sensor in held.sensors
+                and right.holder == message.source
+                and body.sensor in right.sensors
             )
             if not mine or now > witness.over.get(message.session or 0, now):
                 yield "S5", f"lets {message.source} read {body.sensor}"
@@ -821,9 +821,9 @@ class SafetyAudit:
             elif isinstance(body, m.PermissionRevocation):
                 _end(witness, body.session, by)
 
-    def _report(self, found: Iterator[Broken] | list[Broken], now: float, device: str) -> None:
-        for rule, what in found:
-            named = _ID.sub(lambda found: self._name_of(found[0]), what)
+    def _report(self, breaches: Iterator[Broken] | list[Broken], now: float, device: str) -> None:
+        for rule, what in breaches:
+            named = _ID.sub(lambda match: self._name_of(match[0]), what)
             self._recorder.violated(rule, now, self._name_of(device), named)
 
 
@@ -849,10 +849,10 @@ def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[
     """Yield a permission that the DVA confirms to a robot otherwise than it gave it."""
     if not isinstance(content, m.Permission):
         return
-    held = Held(content.device, content.level, content.sensors)
-    grant = witness.sessions.get(content.session, held)
-    if grant != held:
-        yield "S5", f"gives {grant.level} to {grant.holder}, and confirms {held.level}"
+    right = Held(content.device, content.level, content.sensors)
+    grant = witness.sessions.get(content.session, right)
+    if grant != right:
+        yield "S5", f"gives {grant.level} to {grant.holder}, and confirms {right.level}"
 
 
 def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Iterator[Broken]:
@@ -860,9 +860,9 @@ def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Itera
     if not isinstance(value, m.SensorValue):
         return
     for session in witness.confirmed:
-        held = witness.sessions.get(session)
+        right = witness.sessions.get(session)
         over = witness.over.get(session, now)
-        may = held is not None and held.holder == reader and value.sensor in held.sensors
+        may = right is not None and right.holder == reader and value.sensor in right.sensors
         if may and now <= over + witness.obeys_within:
             return
     yield "S5", f"shows {value.sensor} to {reader}, who may not read it"

@@ -107,11 +107,11 @@ class SteppedDrive:
         return "arrived" if self._is_there() else ""
 
     def _is_there(self) -> bool:
-        seen = None if self.frame is None else self.frame.observation
-        if seen is None:
+        observation = None if self.frame is None else self.frame.observation
+        if observation is None:
             return False
-        dx = seen.x - self.goal[0]
-        dy = seen.y - self.goal[1]
+        dx = observation.x - self.goal[0]
+        dy = observation.y - self.goal[1]
         return dx * dx + dy * dy < ARRIVED_WITHIN_M * ARRIVED_WITHIN_M
 
     def _begin_shift(self) -> None:

@@ -50,10 +50,10 @@ class Takeovers:
     def says(self, to: str, reply: m.Reply, now: float) -> None:
         """Note an answer of the DVA: a robot that is not free is stopped for who may take it."""
         robot = self._asked.pop((to, reply.answers), None)
-        held = self._held.get(robot or "")
-        if robot is None or held is None or held.holder == to or reply.code != m.BUSY:
+        hold = self._held.get(robot or "")
+        if robot is None or hold is None or hold.holder == to or reply.code != m.BUSY:
             return
-        self._stopping[robot] = Stopping(to, held.session, now + STOP_WITHIN)
+        self._stopping[robot] = Stopping(to, hold.session, now + STOP_WITHIN)
 
     def given(
         self, rights: Sequence[Right], now: float, works: bool

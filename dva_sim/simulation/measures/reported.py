@@ -50,7 +50,7 @@ def _row(recording: Recording, event: Event, facts: list[Fact]) -> Row:
     times = event.times
     reported = times["detected"]
     x, y = recording.site.frame.to_xy(event.position.latitude, event.position.longitude)
-    seen = event.handling.acknowledged
+    acknowledgement = event.handling.acknowledged
     raised = _first(facts, {"raise"})
     decided = _first((fact for fact in facts if fact.role is not None), _DECISIONS)
     sent = _first(facts, {"assign"})
@@ -61,13 +61,13 @@ def _row(recording: Recording, event: Event, facts: list[Fact]) -> Row:
         "raised_by": raised.label if raised else "",
         "severity": event.severity,
         "ended": "open" if event.open else event.state.value,
-        "acknowledged_by": seen.label if seen else "",
+        "acknowledged_by": acknowledgement.label if acknowledgement else "",
         "decided_by": decided.label if decided else "",
         "sent_by": sent.label if sent else "",
         "sent": recording.label_of(sent.device) if sent and sent.device else "",
         "t_reported_s": reported,
         **{f"t_{step}_s": times.get(step, NAN) for step in ("arrived", "confirmed", "closed")},
-        "acknowledge_s": seen.time - reported if seen else NAN,
+        "acknowledge_s": acknowledgement.time - reported if acknowledgement else NAN,
         "decide_s": decided.time - reported if decided else NAN,
         "send_s": sent.time - reported if sent else NAN,
     }

@@ -118,10 +118,10 @@ def waits(log: DriveLog, end: float) -> list[Span]:
     until = in_hand(log, end)[1]
     spans = [(log.ordered, until if log.taken_up is None else log.taken_up)]
     if log.waits_from is not None:
-        seen = [
+        times = [
             max(since, log.waits_from) for since, to in attended(log, end) if to > log.waits_from
         ]
-        spans.append((log.waits_from, min(seen, default=until)))
+        spans.append((log.waits_from, min(times, default=until)))
     return [span for span in spans if span[1] > span[0]]
 
 

@@ -43,13 +43,13 @@ def contradictions(scenario: Scenario, *, live: bool = False) -> list[str]:
         live: True for runs over real sockets, where the modelled link plays no part.
     """
     link = _of_modelled_link(scenario) if live else _of_link(scenario)
-    others = (
+    checks = (
         _of_map(scenario),
         _of_watchdog(scenario, live),
         _of_team(scenario),
         _of_time(scenario),
     )
-    return [*link, *itertools.chain(*others)]
+    return [*link, *itertools.chain(*checks)]
 
 
 def _of_map(scenario: Scenario) -> Iterator[str]:
@@ -174,8 +174,8 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
             "dispatch.containment waits for a guard, and guard.count is 0: no event will be "
             "contained"
         )
-    given = scenario.robot.sensors
-    carried = [given if given is not None else r.sensors for r in robot_profiles(scenario)]
+    default = scenario.robot.sensors
+    carried = [default if default is not None else r.sensors for r in robot_profiles(scenario)]
     sensors = {sensor.name for each in carried for sensor in each}
     for name in (name for name in scenario.dva.sensors if name not in sensors):
         yield f"dva.sensors names {name!r}, which no robot carries"

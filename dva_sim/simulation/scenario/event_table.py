@@ -237,8 +237,8 @@ class _Reader:
         names = [_plain(name) for name in self._rows.names]
         rows = self._rows
         columns: dict[str, int] = {}
-        for column, others in COLUMNS.items():
-            places = [n for n, name in enumerate(names) if name in (column, *others)]
+        for column, aliases in COLUMNS.items():
+            places = [n for n, name in enumerate(names) if name in (column, *aliases)]
             if len(places) > 1:
                 twins = " and ".join(repr(rows.names[n]) for n in places)
                 raise rows.error(f"has the columns {twins} for {column}: keep one", places[1])

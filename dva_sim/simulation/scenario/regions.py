@@ -70,8 +70,8 @@ def _plan(regions: Mapping[str, RegionConfig], site: Site, error: Fail) -> Regio
     rest = next((name for name, each in regions.items() if each.rest), None)
     if rest is not None:
         ground = shapely.box(*site.extent)
-        others = shapely.union_all([area for name, area in areas.items() if name != rest])
-        areas[rest] = ground - others
+        named = shapely.union_all([area for name, area in areas.items() if name != rest])
+        areas[rest] = ground - named
     for one, other, shared in _overlaps(areas):
         at = shared.representative_point()
         problem = (

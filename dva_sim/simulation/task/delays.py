@@ -22,11 +22,11 @@ SIZE = 100  # of a reading or frame [B]: the line is so fast that it does not ma
 
 
 class Channel(Generic[T]):
-    """One direction: what is put in at one end comes out late, in order, or not at all.
+    """One direction of a link: items arrive late and in order, or are lost.
 
     Args:
-        way: Delay, jitter, loss.
-        extra: On top of them, always [s].
+        delay: Delay, jitter and loss.
+        extra: Constant delay added to it [s].
         streams: Random streams of the trial.
         name: Name of this direction, which selects its random stream.
     """

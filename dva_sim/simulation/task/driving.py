@@ -130,13 +130,15 @@ class DriveTrial(Trial[Observation]):
         )
 
     @override
-    def decide(self, driver: Driver, seen: Observation, now: float) -> None:
+    def decide(self, driver: Driver, observation: Observation, now: float) -> None:
         delay = self.seat.delay
-        delay.see(now, *self._motion(seen))
+        delay.see(now, *self._motion(observation))
         if isinstance(driver, Oracle):
-            intent = driver.drive(self._seen_way, Truth(seen), 0.0)
+            intent = driver.drive(self._seen_way, Truth(observation), 0.0)
         else:
-            intent = driver.drive(self._seen_way, View(now, self._judged(seen), delay.value), 0.0)
+            intent = driver.drive(
+                self._seen_way, View(now, self._judged(observation), delay.value), 0.0
+            )
         self.device.aim(self._held(intent), intent.turn_rate / self._top[1])
         self.intended(now, intent.speed, intent.turn_rate)
 
@@ -144,18 +146,18 @@ class DriveTrial(Trial[Observation]):
         """Return the deflection for the speed, as a share of a full one."""
         return intent.speed / self._top[0]
 
-    def _motion(self, seen: Observation) -> Pair:
+    def _motion(self, observation: Observation) -> Pair:
         """Return the motion from which the person learns the delay [m/s, rad/s]."""
-        return seen.speed, seen.turn_rate
+        return observation.speed, observation.turn_rate
 
-    def _judged(self, seen: Observation) -> Observation:
+    def _judged(self, observation: Observation) -> Observation:
         """Return the observation as the person judges it: place and heading with an error."""
         person = self.seat.person
         error = self._errors
-        return seen._replace(
-            x=seen.x + person.position_error * next(error),
-            y=seen.y + person.position_error * next(error),
-            heading=seen.heading + person.heading_error * next(error),
+        return observation._replace(
+            x=observation.x + person.position_error * next(error),
+            y=observation.y + person.position_error * next(error),
+            heading=observation.heading + person.heading_error * next(error),
         )
 
     @override
@@ -175,8 +177,8 @@ class DriveTrial(Trial[Observation]):
         """Return the machine helps to steer (pure pursuit); the speed stays the person's."""
         at = self.plant
         ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
-        own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
-        return Intent(intent.speed, (1.0 - share) * intent.turn_rate + share * own)
+        turn_rate = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
+        return Intent(intent.speed, (1.0 - share) * intent.turn_rate + share * turn_rate)
 
     def row(self) -> dict[str, Any]:
         """Return what is measured."""
@@ -237,8 +239,8 @@ class HeadingTrial(DriveTrial):
         """Return nothing: only steering is in the hand, so only that is noisy."""
         return 0.0
 
-    def _motion(self, seen: Observation) -> Pair:
-        return 0.0, seen.turn_rate
+    def _motion(self, observation: Observation) -> Pair:
+        return 0.0, observation.turn_rate
 
     def commanded(self, dt: float) -> Pair:
         """Return the speed that the machine holds."""

@@ -216,13 +216,13 @@ class CursorTrial(Trial[Sighting]):
         )
 
     @override
-    def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
+    def decide(self, driver: Driver, sighting: Sighting, now: float) -> None:
         if not self.goal.is_pushed:
-            self.seat.delay.see(now, seen.vx, seen.vy, self._summed)
+            self.seat.delay.see(now, sighting.vx, sighting.vy, self._summed)
         judged = self.seat.judged_delay(now)
-        vx, vy = self._ask(driver, seen, now, judged)
+        vx, vy = self._ask(driver, sighting, now, judged)
         if self.goal.awaits_press and self._presses(
-            driver, PointView(now, seen, judged, self._noise)
+            driver, PointView(now, sighting, judged, self._noise)
         ):
             self.goal.press(self.now)
         if self.goal.flat:
@@ -237,14 +237,14 @@ class CursorTrial(Trial[Sighting]):
             return Strategy.presses(self._eye, view, hurried)
         return driver.presses(view, hurried)
 
-    def _ask(self, driver: Driver, seen: Sighting, now: float, delay: float) -> Velocity:
+    def _ask(self, driver: Driver, sighting: Sighting, now: float, delay: float) -> Velocity:
         path = self.goal.path
         if isinstance(driver, Oracle):
-            truth = Truth(seen)
+            truth = Truth(sighting)
             return driver.point(truth) if path is None else driver.follow(path, truth)
         if path is None:
-            return driver.point(PointView(now, seen, delay, self._noise))
-        return driver.follow(PathView(now, seen, delay, path))
+            return driver.point(PointView(now, sighting, delay, self._noise))
+        return driver.follow(PathView(now, sighting, delay, path))
 
     @override
     def advance(self, dt: float) -> None:

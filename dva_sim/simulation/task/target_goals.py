@@ -24,10 +24,10 @@ class ToTarget(Goal):
     def corrected(self, share: float, now: float, at: Cursor, command: Velocity) -> Velocity:
         """Return the whole of what is wanted: all of it is correction."""
         tx, ty = self.target(now)
-        own = 1.0 - share
+        weight = 1.0 - share
         return (
-            own * command[0] + share * MACHINE_GAIN * (tx - at.x),
-            own * command[1] + share * MACHINE_GAIN * (ty - at.y),
+            weight * command[0] + share * MACHINE_GAIN * (tx - at.x),
+            weight * command[1] + share * MACHINE_GAIN * (ty - at.y),
         )
 
 
@@ -94,11 +94,11 @@ class Wandering:
 
 
 class PointGoal(ToTarget):
-    """Select a target.
+    """Goal of selecting a target.
 
     Args:
         task: Rules of selection.
-        way: Motion of the target.
+        target: Motion of the target.
         width: Width of the target [m].
         press: Time from the decision to press a button to the press at the machine [s].
     """

@@ -197,7 +197,7 @@ class Trial(ABC, Generic[S]):
         """Return what a frame taken now shows."""
 
     @abstractmethod
-    def decide(self, driver: Driver, seen: S, now: float) -> None:
+    def decide(self, driver: Driver, frame: S, now: float) -> None:
         """Decide on a perceived frame; `now` is the person's clock [s]."""
 
     @abstractmethod
@@ -278,9 +278,9 @@ class Trial(ABC, Generic[S]):
             now: [s]
             half: Half the step size [s].
         """
-        seen = self._frames.take(now + half)
-        if seen:
-            self._newest = seen[-1]
+        frames = self._frames.take(now + half)
+        if frames:
+            self._newest = frames[-1]
             if self._acts_from is None:
                 self._acts_from = now + self._surprise
         newest = self._newest

@@ -29,7 +29,7 @@ class EventDraws:
     """
 
     def __init__(self, stream: EventStream, name: str, streams: Streams, terrain: Terrain) -> None:
-        def one(purpose: str) -> Draws[float]:
+        def draws(purpose: str) -> Draws[float]:
             return shares(streams, f"demand/{name}/{purpose}")
 
         still: Draws[float] = Always(0.0)
@@ -38,11 +38,11 @@ class EventDraws:
         self._zones = [terrain.zones.index(zone) for zone in stream.zones]
         weights = list(accumulate(stream.zones.values()))
         self._bounds = [w / weights[-1] for w in weights[:-1]] if weights else []
-        self._zone = one("zone") if len(self._zones) > 1 else still
-        self._x, self._y = (one("x"), one("y")) if terrain.placed else (still, still)
-        self._truth = one("truth") if stream.false_share else Always(1.0)
-        self._severity = one("severity") if isinstance(stream.severity, Severity) else still
-        self._repeated = one("repeated") if stream.repeats else Always(1.0)
+        self._zone = draws("zone") if len(self._zones) > 1 else still
+        self._x, self._y = (draws("x"), draws("y")) if terrain.placed else (still, still)
+        self._truth = draws("truth") if stream.false_share else Always(1.0)
+        self._severity = draws("severity") if isinstance(stream.severity, Severity) else still
+        self._repeated = draws("repeated") if stream.repeats else Always(1.0)
         base = f"demand/{name}"
         repeats = stream.repeats
         self._repeat = times(streams, f"{base}/repeat", repeats.after if repeats else ZERO)

@@ -51,8 +51,8 @@ def check(shift: Shift) -> None:
 
 def _conservation(shift: Shift) -> Iterator[str]:
     """Yield S6: the counts add up, here and in the book, and both know the same open events."""
-    held = sum(len(incidents) for incidents in shift.events.values())
-    if shift.total != len(shift.unnoticed) + held + sum(shift.settled.values()):
+    present = sum(len(incidents) for incidents in shift.events.values())
+    if shift.total != len(shift.unnoticed) + present + sum(shift.settled.values()):
         yield "an event of the world is lost"
     events = shift.core.events
     if sum(events.counts.values()) != events.total:

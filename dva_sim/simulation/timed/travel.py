@@ -362,12 +362,12 @@ def _detected_after(site: Site, kind: str, point: Point) -> float:
 
 
 class Rooms(Terrain):
-    """A site.
+    """Terrain of a site's rooms.
 
     Args:
         name: Name or path.
         spots: Places in each room.
-        way: Kind of distance: none, straight or along paths.
+        travel: Kind of distance: none, straight or along paths.
 
     Raises:
         ConfigError: the site cannot be read, or has no rooms.

@@ -35,8 +35,8 @@ def unnoticed(scenario: TimedScenario) -> Iterator[Unnoticed]:
     ground = terrain_of(scenario)
     assert isinstance(ground, Rooms)  # the scenario refuses detectors without a site
     for kind in dict.fromkeys(stream.kind for stream in streams):
-        own = [stream.zones or ground.zones for stream in streams if stream.kind == kind]
-        zones = {ground.zones.index(name) for names in own for name in names}
+        zone_names = [stream.zones or ground.zones for stream in streams if stream.kind == kind]
+        zones = {ground.zones.index(name) for names in zone_names for name in names}
         places = [place for zone in sorted(zones) for place in ground.spots(zone)]
         hidden = sum(ground.detected_after(kind, place) >= FOUND for place in places)
         if hidden:

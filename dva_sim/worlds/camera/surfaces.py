@@ -150,8 +150,8 @@ class Surfaces:
         ahead[-1] = False
         index = np.flatnonzero(ahead)
         first, last, det, step = _spans(local[index], slopes)
-        seen = (last > first) & (np.abs(det) > 1e-6)
-        index, first, last, det, step = (v[seen] for v in (index, first, last, det, step))
+        is_hit = (last > first) & (np.abs(det) > 1e-6)
+        index, first, last, det, step = (v[is_hit] for v in (index, first, last, det, step))
         count = last - first
         which = np.repeat(np.arange(len(index)), count)
         column = np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)

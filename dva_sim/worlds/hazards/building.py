@@ -167,8 +167,8 @@ class _Parting:
         numbers = np.arange(len(site.compartments) + 1)
         bounds = np.searchsorted(whole.ravel()[cells][order], numbers)
         for number, compartment in enumerate(site.compartments):
-            own = cells[order[bounds[number] : bounds[number + 1]]]
-            rows, columns = np.divmod(own, whole.shape[1])
+            members = cells[order[bounds[number] : bounds[number + 1]]]
+            rows, columns = np.divmod(members, whole.shape[1])
             self._of[compartment.name] = self._cut(
                 rows, columns, compartment.area, compartment.ceiling
             )

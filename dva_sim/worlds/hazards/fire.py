@@ -448,8 +448,8 @@ class FireField(SolvedField):
         if not self._fire.start <= time < self.until:
             return np.zeros(places.spaces.shape)
         if self._seen is None or self._seen[0] is not places:
-            seen = self._sight.from_point(self._fire.position, places.points)
-            self._seen = places, seen
+            is_visible = self._sight.from_point(self._fire.position, places.points)
+            self._seen = places, is_visible
         x, y = self._fire.position
         squared = (places.points[..., 0] - x) ** 2 + (places.points[..., 1] - y) ** 2
         nearest = max(0.1, self._fire.radius(time)) ** 2

@@ -87,12 +87,16 @@ class Air:
         mesh = self.mesh
         forth = _carried(self._spread, self.flow)
         back = _carried(self._spread, -self.flow)
-        own = mesh.area / dt + self._out
-        own = own + np.bincount(mesh.a, forth, len(own)) + np.bincount(mesh.b, back, len(own))
-        here = np.arange(len(own))
+        diagonal = mesh.area / dt + self._out
+        diagonal = (
+            diagonal
+            + np.bincount(mesh.a, forth, len(diagonal))
+            + np.bincount(mesh.b, back, len(diagonal))
+        )
+        here = np.arange(len(diagonal))
         rows = np.r_[here, mesh.b, mesh.a]
         columns = np.r_[here, mesh.a, mesh.b]
-        return coo_array((np.r_[own, -forth, -back], (rows, columns))).tocsc()
+        return coo_array((np.r_[diagonal, -forth, -back], (rows, columns))).tocsc()
 
 
 def _carried(spread: Floats, flow: Floats) -> Floats:
@@ -122,8 +126,8 @@ def _potential_flow(mesh: Mesh, draught: Draught | None) -> Floats:
         raise ConfigError("no way leads from the supply of a draught to its exhaust")
     inside = np.flatnonzero(part == part[draught.supply])
     here = np.setdiff1d(inside, [draught.exhaust])  # its potential is zero
-    own = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
-    matrix = (link + coo_array((own, (np.arange(count),) * 2)).tocsr())[here][:, here]
+    diagonal = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
+    matrix = (link + coo_array((diagonal, (np.arange(count),) * 2)).tocsr())[here][:, here]
     potential = np.zeros(count)
     source = np.zeros(count)
     source[draught.supply] = draught.rate / MIXED_HEIGHT

@@ -238,17 +238,17 @@ class LeakField(SolvedField):
         here = mesh.nearest(x, y)
         there = mesh.nearest(*leak.position)
         source = here
-        seen = there
+        cells = there
         rate = 1.0
         if len(mesh.area) > LARGE_MESH:
             source = there
-            seen = here
+            cells = here
             rate = leak.release
         march = _gas(self._air, source, rate)
 
         def share(age: float) -> float:
             before, after, weight = march.around(age)
-            gas = float(before[seen] + weight * (after[seen] - before[seen]))
+            gas = float(before[cells] + weight * (after[cells] - before[cells]))
             return leak.release / rate * gas
 
         return share

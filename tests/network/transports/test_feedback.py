@@ -78,8 +78,8 @@ class RecordingLaw:
     def begin(self, round_trip: float) -> None:
         self.heard.append(("begin", round_trip))
 
-    def passed(self, round_trip: float, held: bool) -> None:
-        self.heard.append(("passed", round_trip, held))
+    def passed(self, round_trip: float, is_held: bool) -> None:
+        self.heard.append(("passed", round_trip, is_held))
 
     def lost(self) -> None:
         self.heard.append("lost")

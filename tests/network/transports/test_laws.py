@@ -19,7 +19,7 @@ def test_it_sends_nothing_by_itself_before_the_first_round_trip_and_then_one_in_
 def test_it_does_not_speed_up_while_its_gap_holds_nothing_back():
     law = Aimd(1.0, 0.5)
     law.begin(R)
-    law.passed(R, held=False)
+    law.passed(R, is_held=False)
     assert law.gap == pytest.approx(R)
 
 
@@ -28,7 +28,7 @@ def test_aimd_adds_one_datagram_per_round_trip_and_gives_up_half():
     law.begin(R)
     rates = []
     for _ in range(3):
-        law.passed(R, held=True)
+        law.passed(R, is_held=True)
         rates.append(1.0 / law.gap)
     assert rates == pytest.approx([20.0, 30.0, 40.0])
     law.lost()
@@ -42,7 +42,7 @@ def test_two_aimd_rates_that_meet_the_same_losses_become_equal():
     one.rate, other.rate = 10.0, 300.0
     for _ in range(200):
         for law in (one, other):
-            law.passed(R, held=True)
+            law.passed(R, is_held=True)
         if one.rate + other.rate > 400.0:
             one.lost()
             other.lost()
@@ -57,7 +57,7 @@ def test_with_the_stated_increase_the_saw_tooth_sends_what_tcps_square_root_law_
     top, sent, losses = 1000.0, 0.0, 0
     while losses < 20:
         sent += law.rate * R * (losses >= 10)
-        law.passed(R, held=True)
+        law.passed(R, is_held=True)
         if law.rate > top:
             law.lost()
             losses += 1
@@ -70,9 +70,9 @@ def test_queueing_within_the_tolerance_is_none_and_beyond_it_counts_as_a_loss():
     law = Aimd(1.0, 0.2, tolerance=0.01)
     law.begin(R)
     law.rate = 100.0
-    law.passed(R + 0.009, held=False)
+    law.passed(R + 0.009, is_held=False)
     assert law.rate == 100.0
-    law.passed(R + 0.011, held=True)
+    law.passed(R + 0.011, is_held=True)
     assert law.rate == pytest.approx(80.0)
 
 
@@ -80,8 +80,8 @@ def test_a_shorter_round_trip_is_the_new_least():
     law = Aimd(1.0, 0.2, tolerance=0.01)
     law.begin(R)
     law.rate = 100.0
-    law.passed(0.5 * R, held=False)
-    law.passed(R, held=False)  # twice the least one now
+    law.passed(0.5 * R, is_held=False)
+    law.passed(R, is_held=False)  # twice the least one now
     assert law.rate == pytest.approx(80.0)
 
 

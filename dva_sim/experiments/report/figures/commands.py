@@ -36,11 +36,11 @@ class CommandAge(style.ReportFigure):
         if not all(view.part.has(column) for column in columns):
             return None
         figure, axes = style.panel_grid(view, 3.0)
-        look = looks(view.line)
+        look = looks(view.series_factor)
         grids = [view.part.grid(column) for column in columns]
         numbers = Numbers()
         for ax, panel in zip(axes, view.shown, strict=True):
-            for level, offset in style.dodge(view.lines):
+            for level, offset in style.dodge(view.series):
                 ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
                 _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
                 by_column = dict(zip(columns, ages, strict=True))
@@ -49,7 +49,7 @@ class CommandAge(style.ReportFigure):
         style.label_panels(
             axes, view, style.axis_label("age_s", style.wrapped("Command age at application", 22))
         )
-        legend(figure, view.line)
+        legend(figure, view.series_factor)
         return self.finish(figure, caption("command_age"), numbers)
 
 
@@ -106,7 +106,7 @@ class Brought(style.ReportFigure):
             _panel(ax, view, each)
         for ax in axes[: len(measures) - 2]:
             ax.set_xlabel("")
-        legend(figure, view.line)
+        legend(figure, view.series_factor)
         return self.finish(figure, caption("brought"), _numbers(view, measures))
 
 
@@ -115,7 +115,7 @@ def _numbers(view: StudyView, measures: Sequence[ShownMeasure]) -> Numbers:
     numbers = Numbers()
     panel = view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in measures}
-    for level in view.lines:
+    for level in view.series:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
         columns: dict[str, Floats] = {}
         for name, curve in curves.items():
@@ -127,8 +127,8 @@ def _numbers(view: StudyView, measures: Sequence[ShownMeasure]) -> Numbers:
 
 def _panel(ax: Axes, view: StudyView, measure: ShownMeasure) -> None:
     grid = measure.scale * view.part.grid(measure.column)
-    count = len(view.lines)
-    for index, (level, look) in enumerate(looks(view.line).items()):
+    count = len(view.series)
+    for index, (level, look) in enumerate(looks(view.series_factor).items()):
         values = person_means(view.curve(grid, view.panels[0], level))
         offset = WIDTH * ((index + 0.5) / count - 0.5)
         _marks(ax, offset, values, look)

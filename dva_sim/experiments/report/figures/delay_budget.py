@@ -96,12 +96,12 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
 
 
 def _driven(view: StudyView, grid: Floats) -> StudyView:
-    """Return the view without lines under which nobody drove, such as guards without robots."""
-    if view.line is None:
+    """Return the view without series in which nobody drove, such as guards without robots."""
+    if view.series_factor is None:
         return view
-    name = view.line.name
-    levels = [v for v in view.lines if np.isfinite(view.part.where(grid, {name: v})).any()]
-    return replace(view, line=Factor(name, tuple(levels)))
+    name = view.series_factor.name
+    levels = [v for v in view.series if np.isfinite(view.part.where(grid, {name: v})).any()]
+    return replace(view, series_factor=Factor(name, tuple(levels)))
 
 
 def _means(view: StudyView, grid: Floats, panel: Setting, level: Level) -> Floats:
@@ -153,7 +153,7 @@ class Stacks:
     """
 
     def __init__(self, view: StudyView, label: str, parts: Mapping[str, Artist]) -> None:
-        count = len(view.lines)
+        count = len(view.series)
         lines = len(view.stops)
         columns = min(_PANELS_A_ROW, count)
         deep = -(-count // columns)
@@ -176,7 +176,7 @@ class Stacks:
     def panels(self) -> Iterator[tuple[Axes, Setting, Level]]:
         """Yield each panel with its setting and line."""
         view = self._view
-        places = ((panel, level) for panel in view.shown for level in view.lines)
+        places = ((panel, level) for panel in view.shown for level in view.series)
         for ax, (panel, level) in zip(self.axes, places, strict=True):
             yield ax, panel, level
 
@@ -184,7 +184,7 @@ class Stacks:
         """Label the panels; to be called last, since it ends the fitting to what is drawn."""
         view = self._view
         columns = self._columns
-        count = len(self._view.lines)
+        count = len(self._view.series)
         self.axes[0].set_xlim(left=0)
         for index, (ax, panel, level) in enumerate(self.panels()):
             words = capital(brief(view.setting(panel, level)))

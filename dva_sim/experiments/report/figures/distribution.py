@@ -40,15 +40,15 @@ class Distributions(style.ReportFigure):
         figure, axes = style.panels(
             len(panels), 1, 2.7 if len(panels) < 3 else 2.2, sharex=True, sharey=True
         )
-        look = looks(view.line)
+        look = looks(view.series_factor)
         raw = view.part.grid(view.measure)
         confirmed = _confirmed(view)
         numbers = Numbers()
         for (ax,), panel in zip(axes, panels, strict=True):
-            for level, offset in style.dodge(view.lines):
+            for level, offset in style.dodge(view.series):
                 values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
                 ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
-                width = min(0.3, 0.62 / len(view.lines))
+                width = min(0.3, 0.62 / len(view.series))
                 _dots(ax, offset, width, values, ok, look[level])
                 _boxes(ax, offset, width, values)
                 for stop, columns in enumerate(values):
@@ -66,7 +66,7 @@ class Distributions(style.ReportFigure):
         there = present(raw)
         if len(there) and there.min() > 0 and there.max() > 5 * there.min():
             style.log_axis(axes[0][0])
-        legend(figure, view.line)
+        legend(figure, view.series_factor)
         words = caption("distributions", has_missed=bool((confirmed == 0).any()))
         title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
         return self.finish(figure, words, numbers, title=title, reads=(style.hatch_words(view),))

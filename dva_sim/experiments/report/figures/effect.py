@@ -46,20 +46,20 @@ class Differences(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        if view.contrast is None or view.line is None:
+        if view.contrast is None or view.series_factor is None:
             return None
         findings = cadences(view, reading.scenario_of(view.part.name))
         baseline = view.contrast[1]
-        others = tuple(level for level in view.lines if level != baseline)
-        name = level_name(view.line.name, baseline)
+        levels = tuple(level for level in view.series if level != baseline)
+        name = level_name(view.series_factor.name, baseline)
         label = style.axis_label(view.measure, f"Difference against\n{name}")
-        figure, axes, ends, bars, cut, numbers = _curves(view, others, baseline, label)
+        figure, axes, ends, bars, cut, numbers = _curves(view, levels, baseline, label)
         for ax, finding in zip(axes, findings, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, finding)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         mark_cuts(bars)
-        _name(view, others, figure, axes, ends)
+        _name(view, levels, figure, axes, ends)
         excess = "excess " if view.part.has_reference(view.measure) else ""
         title = f"Difference against {name} in {excess}{measure_name(view.measure)}"
         words = caption(
@@ -97,9 +97,9 @@ def _curves(
         that are cut, and the numbers drawn.
     """
     figure, axes = style.panel_grid(view, 3.4)
-    look = looks(view.line)
+    look = looks(view.series_factor)
     every = []
-    seen = [np.zeros(1)]
+    drawn = [np.zeros(1)]
     numbers = Numbers()
     bars: list[Bars] = []
     draw = _band if style.has_lines(view) else _points
@@ -108,7 +108,7 @@ def _curves(
         for level, shift in _side_by_side(view, lines):
             matrix = view.difference(panel, level, baseline)
             bands = _possible(band(matrix, view.level), -view.widest, view.widest)
-            seen.append(matrix.ravel())
+            drawn.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift)
             at = _places(bands, shift)
             bars.append(Bars(ax, at, bands.low, bands.high, look[level].colour))
@@ -127,7 +127,7 @@ def _curves(
         style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     style.label_panels(axes, view, ylabel)
-    cut = fit_to(axes[0], present(np.concatenate(seen)))
+    cut = fit_to(axes[0], present(np.concatenate(drawn)))
     return figure, axes, every, bars, cut, numbers
 
 
@@ -188,9 +188,9 @@ def _name(
 ) -> None:
     """Name lines at their ends, and marks in a key."""
     if style.has_lines(view):
-        name_lines(axes, ends, view.line)
-    elif view.line is not None:
-        legend(figure, view.line, lines)
+        name_lines(axes, ends, view.series_factor)
+    elif view.series_factor is not None:
+        legend(figure, view.series_factor, lines)
 
 
 def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
@@ -209,8 +209,8 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
     ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=colour, lw=1.2)
     ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
-    seen = present(bands.mean)
-    return float(seen[-1]) if len(seen) else float("nan")
+    means = present(bands.mean)
+    return float(means[-1]) if len(means) else float("nan")
 
 
 def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
@@ -218,7 +218,7 @@ def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | Non
 
     None unless delay and a waiting pattern are varied.
     """
-    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
+    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.series)
     if view.over is None or view.over.name != "link.delay_s" or not waits:
         return [None for _ in view.shown]
     return [cadence(scenario, panel) for panel in view.shown]

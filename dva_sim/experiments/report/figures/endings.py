@@ -45,26 +45,28 @@ class EndingsInTime(style.ReportFigure):
         endings = reading.endings
         if endings is None:
             return None
-        others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
-        lines = tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MAX_LINES]
-        stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][
+        with_failures = [
+            level for level in view.series if not _all_right(endings, [level], view.stops)
+        ]
+        levels = tuple(dict.fromkeys([*(view.contrast or ()), *with_failures]))[:_MAX_LINES]
+        stops = [stop for stop in view.stops if not _all_right(endings, levels, [stop])][
             -_MAX_STOPS:
         ]
         if not stops:
             return None
-        figure, axes = style.panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
+        figure, axes = style.panels(len(levels), len(stops), 1.9, sharex=True, sharey=True)
         times = np.linspace(0.0, endings.horizon, _POINTS)
         numbers = Numbers()
-        for row, line in zip(axes, lines, strict=True):
+        for row, level in zip(axes, levels, strict=True):
             for ax, stop in zip(row, stops, strict=True):
-                mask = endings.under(line, stop)
+                mask = endings.under(level, stop)
                 if mask.any():
                     shares = _shares(endings, mask, times)
                     stack_in_time(ax, shares, times)
-                    where = view.setting(view.panels[0], line) | style.stop_of(view, stop)
+                    where = view.setting(view.panels[0], level) | style.stop_of(view, stop)
                     numbers.add(where, {"t_s": times} | shares)
                 ax.grid(False)
-            name = level_name(view.line.name, line) if view.line else ""
+            name = level_name(view.series_factor.name, level) if view.series_factor else ""
             words = style.wrapped(name, 24)
             row[0].set_ylabel(f"{words}\nshare of events".strip())
         axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))

@@ -72,14 +72,14 @@ class HeatMap(style.ReportFigure):
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         fields = _fields(view)
-        if not fields or view.over is None or view.line is None or view.contrast is None:
+        if not fields or view.over is None or view.series_factor is None or view.contrast is None:
             return None
         second = fields[0].second
         figure, grid = style.panels(
             len(fields), 1, max(2.4, 1.0 + 0.38 * len(second.levels)), sharex=True
         )
         axes = [ax for (ax,) in grid]
-        first, other = (level_name(view.line.name, level) for level in view.contrast)
+        first, other = (level_name(view.series_factor.name, level) for level in view.contrast)
         reach = max(float(np.nanmax(abs(field.mean))) for field in fields) or 1.0
         has_zero = False
         for ax, field in zip(axes, fields, strict=True):
@@ -124,10 +124,10 @@ def _field(
 
 def _second(view: StudyView) -> Factor | None:
     """Return the other factor with most levels; of equal ones a quantity first."""
-    if view.line is None or view.over is None or len(view.over.levels) < 2:
+    if view.series_factor is None or view.over is None or len(view.over.levels) < 2:
         return None
-    others = [f for f in view.part.factors if f not in (view.line, view.over)]
-    worth = [f for f in others if len(f.levels) >= _MIN_LEVELS]
+    free = [f for f in view.part.factors if f not in (view.series_factor, view.over)]
+    worth = [f for f in free if len(f.levels) >= _MIN_LEVELS]
     return max(worth, key=lambda f: (len(f.levels), f.is_numeric), default=None)
 
 

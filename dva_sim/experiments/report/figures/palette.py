@@ -140,11 +140,11 @@ def looks(factor: Factor | None) -> dict[Level, Look]:
     """
     if factor is None:
         return {None: SINGLE_LOOK}
-    own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
-    taken = {look.colour for look in own.values()}
+    fixed = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
+    taken = {look.colour for look in fixed.values()}
     free = [look for look in _FREE if look.colour not in taken] or list(_FREE)
-    others = [level for level in factor.levels if level not in own]
-    look_by_level = own | {level: free[i % len(free)] for i, level in enumerate(others)}
+    free_levels = [level for level in factor.levels if level not in fixed]
+    look_by_level = fixed | {level: free[i % len(free)] for i, level in enumerate(free_levels)}
     return {level: look_by_level[level] for level in factor.levels}
 
 

@@ -81,15 +81,18 @@ def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
     grid = part.outcome(view.measure)
 
     def at(level: Level) -> Floats:
-        line = {view.line.name: level} if view.line else {}
-        return part.where(grid, panel | line)
+        line_setting = {view.series_factor.name: level} if view.series_factor else {}
+        return part.where(grid, panel | line_setting)
 
-    if view.contrast is not None and view.line is not None:
+    if view.contrast is not None and view.series_factor is not None:
         first, second = view.contrast
-        name = " minus ".join(level_name(view.line.name, level) for level in view.contrast)
+        name = " minus ".join(level_name(view.series_factor.name, level) for level in view.contrast)
         return [Cloud(name, at(first) - at(second), None)]
-    names = [level_name(view.line.name, level) if view.line else "" for level in view.lines]
-    return [Cloud(name, at(level), level) for name, level in zip(names, view.lines, strict=True)]
+    names = [
+        level_name(view.series_factor.name, level) if view.series_factor else ""
+        for level in view.series
+    ]
+    return [Cloud(name, at(level), level) for name, level in zip(names, view.series, strict=True)]
 
 
 class Scatter(style.ReportFigure):
@@ -111,7 +114,10 @@ class Scatter(style.ReportFigure):
         for ax, name, x in zip(axes, names, where, strict=True):
             for cloud, y in zip(clouds, means, strict=True):
                 _dots(
-                    ax, x, y, SINGLE_LOOK if cloud.level is None else looks(view.line)[cloud.level]
+                    ax,
+                    x,
+                    y,
+                    SINGLE_LOOK if cloud.level is None else looks(view.series_factor)[cloud.level],
                 )
             ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
             if (ranges.get(name) or {}).get("scale") == "log":
@@ -122,7 +128,7 @@ class Scatter(style.ReportFigure):
         for row in grid:
             row[0].set_ylabel(style.axis_label(view.measure, style.wrapped(label, 26)))
         if view.contrast is None:
-            legend(figure, view.line)
+            legend(figure, view.series_factor)
         numbers = Numbers()
         for cloud, y in zip(clouds, means, strict=True):
             columns = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
@@ -147,8 +153,13 @@ def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
     ax.scatter(x, y, marker=look.mark, color=look.colour, alpha=0.35, lw=0, zorder=2, **few)
     middle, mean, half = trend(x, y)
     ax.fill_between(middle, mean - half, mean + half, color=look.colour, alpha=0.16, lw=0)
-    line: dict[str, Any] = {"color": look.colour, "marker": look.mark, "mec": PAPER, "mew": 0.6}
-    ax.plot(middle, mean, "-", ms=5, lw=1.4, zorder=3, **line)
+    style_of_line: dict[str, Any] = {
+        "color": look.colour,
+        "marker": look.mark,
+        "mec": PAPER,
+        "mew": 0.6,
+    }
+    ax.plot(middle, mean, "-", ms=5, lw=1.4, zorder=3, **style_of_line)
 
 
 def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

@@ -49,7 +49,7 @@ class TradeOff(style.ReportFigure):
         ends = []
         bars = list[Bars]()
         for ax, panel in zip(axes, view.shown, strict=True):
-            for level in view.lines:
+            for level in view.series:
                 grids = (view.curve(view.part.grid(column), panel, level) for column in columns)
                 bands = [band(person_means(grid)) for grid in grids]
                 bars += _line(ax, view, level, *bands)
@@ -71,7 +71,7 @@ class TradeOff(style.ReportFigure):
             _name_stops(ax, view, x, y)
         figure.supxlabel(style.axis_label(columns[0]), fontsize="medium")
         figure.supylabel(style.axis_label(columns[1]), fontsize="medium")
-        legend(figure, view.line)
+        legend(figure, view.series_factor)
         title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
         along = (
             factor_name(view.over.name) if style.leads_on(view) and view.over is not None else ""
@@ -91,18 +91,18 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
     """Cut the crosses of few persons far beyond what any person did, lest they flatten all."""
     for name, column in zip("xy", columns, strict=True):
         grid = view.part.grid(column)
-        every = [person_means(view.curve(grid, p, v)) for p in view.shown for v in view.lines]
-        seen = present(np.concatenate([values.ravel() for values in every]))
-        room = _ROOM * (float(np.ptp(seen)) or 1.0)
+        every = [person_means(view.curve(grid, p, v)) for p in view.shown for v in view.series]
+        points = present(np.concatenate([values.ravel() for values in every]))
+        room = _ROOM * (float(np.ptp(points)) or 1.0)
         low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
-        low = max(low, seen.min() - _ROOM_BELOW * room)
-        high = min(high, seen.max() + room)
+        low = max(low, points.min() - _ROOM_BELOW * room)
+        high = min(high, points.max() + room)
         ax.set(**{f"{name}lim": (low, high)})
 
 
 def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> list[Bars]:
     """Return a mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
-    paint, mark = looks(view.line)[level]
+    paint, mark = looks(view.series_factor)[level]
     x = exposure.mean
     y = response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)

@@ -102,8 +102,8 @@ def _condition_text(key: str, value: float) -> str:
 def _way(ax: Axes, trace: Trace, unit: LengthUnit, scenario: TaskScenario) -> None:
     from matplotlib.patches import Circle
 
-    for line in trace.walls:
-        ax.plot(*_scaled(line, unit), color=SOFT, lw=1.2)
+    for wall in trace.walls:
+        ax.plot(*_scaled(wall, unit), color=SOFT, lw=1.2)
     circle = {"facecolor": FAINT, "edgecolor": SOFT, "lw": 0.8}
     for x, y, radius in trace.marks:
         ax.add_patch(Circle((x * unit.per_m, y * unit.per_m), radius * unit.per_m, **circle))
