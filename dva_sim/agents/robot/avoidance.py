@@ -1,10 +1,10 @@
-"""Getting past people and other robots: which lane to drive in, who goes first, where to wait.
+"""Avoidance of people and other robots: lanes, right of way, and places to wait.
 
-A lane is the planned way shifted sideways for as long as somebody is there. Everybody keeps to
-the right where both sides are as good, so that two who meet do not dodge to the same side.
+A lane is the planned path shifted sideways while somebody is there. Where both sides are equally
+good everybody keeps to the right, so that two who meet do not dodge to the same side.
 
-Right of way where only one fits through: people before robots; who stands in the narrow part
-already; then the robot of the lower number. The other one steps aside.
+Right of way where only one fits through: people before robots; then a robot that is already in the
+narrow part; then the robot with the lower number. The other one steps aside.
 
 References:
     E. T. Hall: The Hidden Dimension. Doubleday, 1966: personal distance begins at 0.45 m (18
@@ -27,46 +27,46 @@ from dva_sim.agents.route_following import Route
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
-SOCIAL = 1.2  # gap to people from which on a robot drives at full speed [m] (Hall)
-SQUEEZE = 0.20  # gap to people who stand in the way and do not go [m]; assumed
-CREEP = 0.15  # speed beside somebody [m/s]; assumed
+SOCIAL = 1.2  # gap to people beyond which a robot drives at full speed [m] (Hall)
+SQUEEZE = 0.20  # gap to people who stand in the way and do not move [m]; assumed
+CREEP = 0.15  # speed beside people [m/s]; assumed
 LANE_ROOM = 0.06  # gap to walls in a lane other than the planned one [m]; assumed
 
-LOOK_AHEAD_M = 4.0  # how far ahead lanes are looked at [m]
-STEP = 0.2  # between the points of a lane [m]
-RAMP = 1.2  # way on which a lane goes over to the side [m]
-HOLDS = (1.6, 2.8, 4.0)  # where a lane goes back to the middle [m]
-SIDES = (0.0, -0.25, 0.25, -0.5, 0.5, -0.7, 0.7, -0.82, 0.82, -1.0, 1.0)  # to the left [m]
+LOOK_AHEAD_M = 4.0  # length of lanes ahead of the robot [m]
+STEP = 0.2  # distance between the points of a lane [m]
+RAMP = 1.2  # distance on which a lane moves to the side [m]
+HOLDS = (1.6, 2.8, 4.0)  # distances at which a lane returns to the middle [m]
+SIDES = (0.0, -0.25, 0.25, -0.5, 0.5, -0.7, 0.7, -0.82, 0.82, -1.0, 1.0)  # shifts to the left [m]
 LANE_SPARE = 0.02  # gap in a lane on top of the one to be kept [m]
-TO_THE_LEFT = 0.2  # how much worse a lane on the left is [m]
-CHANGE = 0.3  # how much worse it is to change one's mind, by the way between the lanes
-PACE = 0.4  # speed that one's own way is timed by [m/s]
-FORESEEN = 6.0  # how long others are expected to go on as they do [s]
-NARROW = 0.35  # a gap to the wall smaller than this lets nobody pass [m]
-REFUGE = 3.0  # how far to look for a place to step aside to [m]
-SPARE = 0.15  # gap left to who passes a robot that has stepped aside [m]
+TO_THE_LEFT = 0.2  # additional cost of a lane on the left [m]
+CHANGE = 0.3  # cost of changing lanes per distance between them
+PACE = 0.4  # speed assumed for the robot's own progress [m/s]
+FORESEEN = 6.0  # time for which others are expected to keep their velocity [s]
+NARROW = 0.35  # a smaller gap to the wall lets nobody pass [m]
+REFUGE = 3.0  # maximum distance of a place to step aside to [m]
+SPARE = 0.15  # gap between a robot that has stepped aside and one that passes [m]
 
 
-# One lane of each side and each place where it goes back; the planned way is the first.
+# One lane for each side and each distance of its return; the planned path is the first.
 _LANES = np.array([(side, hold) for side in SIDES for hold in (HOLDS if side else HOLDS[:1])])
 _SIDES, _HOLDS = _LANES.T
 
 
 class Lane(NamedTuple):
-    """A way past those who are near: its points `(n, 2)` [m], and how far to the left [m]."""
+    """Lane past others: its points `(n, 2)` [m], and its shift to the left [m]."""
 
     points: Floats
     side: float
 
 
 class Blocked(NamedTuple):
-    """No lane is free.
+    """Result when no lane is free.
 
     Attributes:
         by: The nearest obstacle in the lane.
         distance: Distance to it [m].
         gap: The smallest gap to anybody on that lane [m].
-        lane: The lane that leaves the others most room.
+        lane: The lane with most room.
     """
 
     by: Nearby
@@ -77,11 +77,11 @@ class Blocked(NamedTuple):
 
 @dataclass(frozen=True)
 class Avoidance:
-    """Finds ways past others.
+    """Finder of lanes past others.
 
     Attributes:
         name: Name of this robot.
-        radius: Its own [m].
+        radius: Radius of this robot [m].
         room_at: Distance to the nearest wall at points `(n, 2)` [m].
     """
 
@@ -106,14 +106,14 @@ class Avoidance:
     def lane(
         self, route: Route, along: float, here: Point, others: Sequence[Nearby], last: float
     ) -> Lane | Blocked:
-        """Return the best free lane ahead, or who is in the way.
+        """Return the best free lane ahead, or what blocks it.
 
         Args:
-            route: The planned way.
+            route: The planned path.
             along: Distance covered along the route [m].
             here: Current position [m].
             others: Others nearby.
-            last: The side that was chosen before [m].
+            last: Shift to the left that was chosen before [m].
         """
         along_lane = np.arange(0.0, min(LOOK_AHEAD_M, route.length - along) + STEP, STEP)
         base = np.array([route.point_at(along + s) for s in along_lane.tolist()])
@@ -123,7 +123,7 @@ class Avoidance:
         north = here[1] - float(base[0, 1])
         offset = east * float(left[0, 0]) + north * float(left[0, 1])
         places = self._foreseen(along_lane, here, others)
-        if last == 0.0:  # then nothing is better than the planned way
+        if last == 0.0:  # no lane can be better than the planned path: look at that alone first
             points = base + _shifts(along_lane, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
             if self._are_free(points, places, others)[1].all():
                 return Lane(points[0], 0.0)
@@ -136,6 +136,7 @@ class Avoidance:
         if len(choices):
             best = int(choices[np.argmin(cost[choices])])
             return Lane(points[best], float(_SIDES[best]))
+        # None is free: take the lane where least of the gaps to others is missing.
         lack = np.maximum(keep - gaps, 0.0).max(axis=(0, 2))
         choices = np.flatnonzero(walls.all(axis=1))
         best = int(choices[np.argmin((lack + 0.05 * cost)[choices])])
@@ -152,9 +153,9 @@ class Avoidance:
         return keeps
 
     def _foreseen(self, along_lane: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
-        """Predict where others will be along one's path: `(2, others, n)` [m].
+        """Predict where others will be along the robot's path: `(2, others, n)` [m].
 
-        One with the right of way is expected to keep moving; the other to stay where it is.
+        Others with the right of way are expected to keep moving, all others to stay.
         """
         x, y, vx, vy = np.array([(o.x, o.y, o.vx, o.vy) for o in others]).T[..., None]
         first = np.array(self.yields_to(here, others))[:, None]
@@ -164,7 +165,7 @@ class Avoidance:
     def _are_free(
         self, points: Floats, places: Floats, others: Sequence[Nearby]
     ) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return gaps between surfaces to everybody, `(others, k, n)` [m], and where they suffice.
+        """Return the gaps to everybody, `(others, k, n)` [m], and where they suffice.
 
         A gap that is too small already may grow.
 
@@ -183,13 +184,13 @@ class Avoidance:
         return gaps, np.asarray(enough.all(axis=0))
 
     def refuge(self, here: Point, route: Floats, others: Sequence[Nearby]) -> Point | None:
-        """Return the nearest place beside the way where one is in nobody's way.
+        """Return the nearest place beside the path where the robot blocks nobody.
 
         None if there is none.
 
         Args:
             here: Current position [m].
-            route: The way to leave free, shape `(n, 2)` [m].
+            route: Path to leave free, shape `(n, 2)` [m].
             others: Others nearby.
         """
         rings = np.arange(0.4, REFUGE + 0.1, 0.2)
@@ -222,7 +223,7 @@ class Avoidance:
 def _blocked(
     others: Sequence[Nearby], gaps: Floats, keep: Floats, along_lane: Floats, lane: Lane
 ) -> Blocked:
-    """Return who blocks a lane first: gaps `(others, n)` and distances to keep `(others, 1)`."""
+    """Return the first obstacle; gaps are `(others, n)`, distances to keep `(others, 1)`."""
     tight = gaps < keep
     at = np.where(tight.any(axis=1), along_lane[tight.argmax(axis=1)], math.inf)
     order = np.lexsort((gaps.min(axis=1), at))
@@ -231,9 +232,9 @@ def _blocked(
 
 
 def pace_among(people: Sequence[Nearby], here: Point, radius: float, speed: float) -> float:
-    """Return the speed that suits the nearest person.
+    """Return a speed limited by the distance of the nearest person.
 
-    Slower from `SOCIAL` on, crawling at `PERSONAL`.
+    It falls from `SOCIAL` on, down to `CREEP` at `PERSONAL`.
     """
     gaps = [math.dist(here, (p.x, p.y)) - radius - p.radius for p in people if p.kind == "person"]
     share = (min(gaps, default=SOCIAL) - PERSONAL) / (SOCIAL - PERSONAL)
@@ -241,7 +242,7 @@ def pace_among(people: Sequence[Nearby], here: Point, radius: float, speed: floa
 
 
 def _number(name: str) -> tuple[int, str]:
-    """Return orders names such that robot-2 comes before robot-10."""
+    """Return a sorting key by which robot-2 comes before robot-10."""
     return len(name), name
 
 

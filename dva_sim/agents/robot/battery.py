@@ -1,4 +1,4 @@
-"""A robot's battery: what driving and waiting take, what the base gives back."""
+"""Battery of a robot: consumption while driving and waiting, and charging at the base."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field
 from dva_sim.kernel.config import Config
 from dva_sim.worlds.bodies import G
 
-JOULES: Final = 3600.0  # in a watt-hour
+JOULES: Final = 3600.0  # joules per watt-hour
 
 
 class BatteryProfile(Config):
@@ -18,8 +18,8 @@ class BatteryProfile(Config):
     Attributes:
         idle_w: Power of computer, sensors and radio, driving or not.
         rolling_resistance: Force against rolling by weight.
-        efficiency: Share of the energy taken that reaches the floor.
-        charging_w: Charging power of the base, besides what is used meanwhile.
+        efficiency: Share of the energy that reaches the floor.
+        charging_w: Charging power of the base, on top of the consumption meanwhile.
 
     References:
         J. Y. Wong: Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 1: rolling resistance
@@ -34,7 +34,7 @@ class BatteryProfile(Config):
 
 
 class Battery:
-    """The charge of one robot, kept by counters that only grow, so it may be asked seldom.
+    """Charge of one robot, computed from counters that only grow, so at any interval.
 
     Args:
         profile: Capacity and consumers.
@@ -63,14 +63,14 @@ class Battery:
         return self.energy <= 0.0
 
     def advance(self, time: float, distance: float, work: float, at_base: bool) -> None:
-        """Account for what has happened since the last time.
+        """Account for the energy used since the last call.
 
-        Braking gives nothing back, and what is empty draws nothing.
+        Braking gives nothing back, and an empty battery supplies nothing.
 
         Args:
-            time: Now [s].
-            distance: Driven altogether [m].
-            work: Done by the motors altogether, besides rolling [J].
+            time: Time [s].
+            distance: Total distance driven [m].
+            work: Total work of the motors besides rolling [J].
             at_base: True if the robot has stood at a base all that time, and was charged.
         """
         spent = time - self._time

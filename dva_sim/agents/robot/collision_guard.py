@@ -1,8 +1,8 @@
 """Collision guard: robots nearby, and slowing before contact; coordinated control.
 
-The guard is a loop at the robot. It never makes a robot faster and never turns it: who drives
-stays in charge of where to go, and can always turn away on the spot. It knows the plan of the site
-and who is near, and nothing else.
+The guard is a loop at the robot. It never makes a robot faster and never turns it: its driver
+stays in charge of the direction, and can always turn away on the spot. It knows only the plan of
+the site and the bodies nearby.
 
 References:
     T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992
@@ -26,16 +26,16 @@ from dva_sim.worlds.physics import PersonBody, World
 
 Point = tuple[float, float]
 
-PERSONAL = 0.45  # where personal distance begins: 18 inches [m] (Hall, see `avoidance`)
+PERSONAL = 0.45  # gap to people: personal distance begins at 18 inches [m] (Hall, see `avoidance`)
 KEEP_ROBOT = 0.10  # gap to other robots [m]; assumed
 
 
 class Nearby(NamedTuple):
-    """Somebody in sight and within reach of the robot's sensors.
+    """Person or robot in sight and within reach of the robot's sensors.
 
     Attributes:
         kind: `robot` or `person`.
-        name: Robots know each other by name; of people it only tells one from the other.
+        name: Name of a robot; for people only a way to tell them apart.
         x: Position to the east [m].
         y: Position to the north [m].
         vx: Velocity to the east [m/s].
@@ -60,7 +60,7 @@ _make_nearby = maker(Nearby)
 def who_is_near(
     world: World, body: RobotBody, within: float, sees: Callable[[Point, Point], bool]
 ) -> tuple[Nearby, ...]:
-    """Return everybody in sight, the nearest first; tracked, so that velocities are known.
+    """Return the bodies in sight with their velocities, the nearest first.
 
     Args:
         body: Robot whose sensors look.
@@ -87,13 +87,13 @@ def who_is_near(
 
 Floats = NDArray[np.float64]
 
-KEEP_WALL = 0.01  # kept to walls; the grid is on the safe side by up to a cell [m]; assumed
-TIME_TO_CONTACT = 1.0  # speed is scaled so that contact is at least so far off [s]; assumed
-REACTION = 0.35  # until brakes answer: a period of the loop, and the motors' lag [s]; assumed
-STEP = 0.05  # between the samples of an arc [m]
-STEADY_GAP_M = 0.005  # a gap that shrinks by less does not shrink [m]
-SLOWEST = 1e-3  # slower than this is not at all [m/s]
-ROUNDS = 4  # a slower robot turns more sharply: its arc is looked at again so often
+KEEP_WALL = 0.01  # gap to walls; the grid is already safe by up to a cell [m]; assumed
+TIME_TO_CONTACT = 1.0  # minimum time until contact at the scaled speed [s]; assumed
+REACTION = 0.35  # delay of the brakes: a period of the loop and the motors' lag [s]; assumed
+STEP = 0.05  # distance between the samples of an arc [m]
+STEADY_GAP_M = 0.005  # a gap that shrinks by less counts as steady [m]
+SLOWEST = 1e-3  # slower counts as standing [m/s]
+ROUNDS = 4  # iterations: at a lower speed the arc is sharper, so its clearance changes
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ class CollisionGuard:
 
         Args:
             pose: Position and heading [m, rad].
-            speed: Asked for [m/s].
-            turn_rate: Asked for; it stays as it is [rad/s].
+            speed: Requested speed [m/s].
+            turn_rate: Requested turn rate, which stays as it is [rad/s].
             others: Others nearby.
         """
         for _ in range(ROUNDS):
@@ -130,7 +130,8 @@ class CollisionGuard:
                 return 0.0
             reach = max(speed * TIME_TO_CONTACT, self.stopping_distance(speed)) + STEP
             free = self.free_way(pose, speed, turn_rate, others, reach)
-            # Both the brakes and the time to contact have to suffice.
+            # The highest speed that satisfies both: braking v * REACTION + v^2 / (2 a) within the
+            # free distance, and the time to contact.
             late = self.deceleration * REACTION
             braking = math.sqrt(late**2 + 2.0 * self.deceleration * free) - late
             allowed = min(braking, free / TIME_TO_CONTACT)
@@ -157,10 +158,10 @@ class CollisionGuard:
 
         Args:
             pose: Position and heading [m, rad].
-            speed: Above 0 [m/s].
-            turn_rate: [rad/s]
+            speed: Speed, above 0 [m/s].
+            turn_rate: Turn rate [rad/s].
             others: Others nearby, at their current positions.
-            reach: Look no farther than that [m].
+            reach: Maximum distance of interest [m].
         """
         lengths = np.arange(0.0, reach + STEP, STEP)
         points = _arc(pose, turn_rate / speed, lengths)
@@ -174,7 +175,7 @@ class CollisionGuard:
 
 
 def _first(flags: NDArray[np.bool_]) -> int:
-    """Return the place of the first true value; the length if there is none."""
+    """Return the index of the first true value; the length if there is none."""
     at = int(flags.argmax())
     return at if flags[at] else len(flags)
 
@@ -186,5 +187,6 @@ def _arc(pose: tuple[float, float, float], curvature: float, lengths: Floats) ->
     """
     x, y, heading = pose
     half = 0.5 * curvature * lengths
+    # NumPy's sinc includes the factor pi; it stays exact for a straight line.
     chord = lengths * np.sinc(half / math.pi)
     return np.stack([x + chord * np.cos(heading + half), y + chord * np.sin(heading + half)], 1)

@@ -1,10 +1,10 @@
 """A robot's computer: it takes one message at a time, each for its processing time.
 
-That time is always the same, or drawn from a distribution. The robot's holder has every second
-turn, and all strangers together, however many, at most a fifth of the time while it is driven, if
-they can behind the holder's messages: what they take must not grow with their connections, which
-cost them nothing. An emergency waits for the one message that is being worked on, and one
-processing answers all that have come by its end: more of them cannot stop the robot any better.
+That time is constant or drawn from a distribution. The robot's holder has every second turn. While
+the robot is driven, all strangers together get at most a fifth of the time, if possible right after
+a message of the holder: their share must not grow with their number of connections, which cost
+them nothing. An emergency waits only for the message that is being processed, and one processing
+answers all emergencies that have come by its end: more of them cannot stop the robot any better.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
-MAX_OF_OTHERS = 64  # messages that may wait of all but the holder: each look at them has its price
-PER_CONNECTION = 8  # messages that may wait of a connection that is not the holder's
-REST = 4.0  # how long strangers rest after a message of theirs, in times of its processing
-AFTER_HOLDER = 1.0  # and for so long they wait for a message of its holder, to come behind it [s]
-TICK = 1e-6  # of the clock [s]
+MAX_OF_OTHERS = 64  # maximum waiting messages of all but the holder; each look at them costs time
+PER_CONNECTION = 8  # maximum waiting messages of a connection that is not the holder's
+REST = 4.0  # pause of strangers after a message of theirs, in processing times
+AFTER_HOLDER = 1.0  # maximum further wait of strangers for a message of the holder to follow [s]
+TICK = 1e-6  # resolution of the clock [s]
 
 
-PUBLISHED: Final = object()  # stands for whoever publishes commands: one at a time
+PUBLISHED: Final = object()  # key of the publisher of commands, of which there is one at a time
 
 
 class Standing(IntEnum):
     """Standing of a message's sender: why a robot should listen to it."""
 
-    HOLDER = 0  # has proved it: by the session, or as the robot has subscribed to it
-    DVA = 1  # says so; without keys anybody can
+    HOLDER = 0  # proved by the session, or by the robot's own subscription
+    DVA = 1  # claimed by the sender; without keys anybody can
     OTHER = 2
 
 
-HOLDER, DVA, OTHER = Standing  # a member is looked up in its class fifteen times as slowly
+HOLDER, DVA, OTHER = Standing  # globals: looking a member up is fifteen times as slow
 
 
 class Letter(NamedTuple):
@@ -176,7 +176,7 @@ class FairQueue:
         return letter
 
     def forget_published(self) -> int:
-        """Drop published commands, which nobody waits for; return their number."""
+        """Drop published commands, to which nobody expects a reply; return their number."""
         gone = len(self._queues.pop((PUBLISHED, True), ()))
         self.length -= gone
         return gone
@@ -190,7 +190,7 @@ def _nobody_waits(_: Letter) -> None:
 
 
 class CommandQueue:
-    """Emergencies first, but for every second turn; the holder's next after each of another.
+    """Emergencies in every other turn, then the holder alternating with all others.
 
     The holder's next message waits for one message of others at most, for two messages where one
     of the holder's own is being worked on, and for four while emergencies come.
@@ -202,18 +202,18 @@ class CommandQueue:
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
         limit: Maximum number of queued messages of the holder, and of emergencies.
-        read: Reads what arrives, before it waits: what is None was refused, and takes no time.
-            Without it all is taken as bytes, and only emergencies are read.
+        read: Function that reads a request on arrival; None: it was refused, and takes no time.
+            Without this function only emergencies are read, and the rest is queued as bytes.
         standing: Current standing of a message's sender.
         driven: Predicate: True while somebody drives the robot, so that other senders must leave it
             time.
-        refuse: Callback for each letter that there is no room for.
+        refuse: Callback for each letter that does not fit.
 
     Attributes:
         service: Service time; may be replaced at any time.
         latest_wins: True to keep only the newest command; may be changed at any time.
-        flow: Source of published commands, if it can be paused: then a full inbox takes nothing
-            more until half of it is done. Commands of sources that cannot be paused are dropped.
+        flow: Source of published commands, if it can be paused: a full inbox pauses it until
+            half of the inbox is done. Commands of other sources are dropped.
     """
 
     def __init__(
@@ -243,7 +243,7 @@ class CommandQueue:
         self._waiting = FairQueue(limit, standing)
         self._last = HOLDER
         self._turns = [DVA, OTHER]
-        self._rested = -math.inf  # strangers are, from then on [s]
+        self._rested = -math.inf  # end of the strangers' pause [s]
         self.longest = self.superseded = self.overflowed = 0
 
     def __len__(self) -> int:
@@ -259,6 +259,7 @@ class CommandQueue:
         """Take a request whose sender waits for the answer."""
         data = request.data
         message = None
+        # A cheap look at the bytes, so that a flood of emergencies is refused before it is parsed.
         looks_urgent = b"<EmergencyMsg" in data
         if looks_urgent and not self._has_room(request.peer):
             self._turn_away(Letter(data, self._clock.now, request))
@@ -280,7 +281,7 @@ class CommandQueue:
         return of_peer < PER_CONNECTION and len(self._emergencies) < self._limit
 
     def published(self, data: bytes, message: Message | None = None) -> None:
-        """Take a command that nobody waits to be answered; its reader says so."""
+        """Take a published command, which needs no reply."""
         if self.latest_wins:
             self.superseded += self.forget_published()
         self._put(_make_letter(data, self._clock.now, None, message, True))
@@ -292,11 +293,11 @@ class CommandQueue:
             self.flow.pause()
 
     def forget_published(self) -> int:
-        """Drop the published commands that wait: how many those were."""
+        """Drop the waiting published commands; return their number."""
         return self._waiting.forget_published()
 
     def _put(self, letter: Letter, urgent: bool = False) -> None:
-        """Take a letter in; the holder's that finds nothing else here is worked on at once."""
+        """Add a letter; one of the holder in an idle inbox is processed at once."""
         idle = not (self._busy or urgent or self._emergencies or self._waiting.length)
         if idle and self._standing(letter) is HOLDER:
             self._last = HOLDER
@@ -322,14 +323,14 @@ class CommandQueue:
         self._refuse(letter)
 
     def _work(self) -> None:
-        """Take what is next; where processing takes no time, all of it."""
+        """Process the next letters; if processing takes no time, all that wait."""
         while letters := self._next():
             if not self._begin(letters):
                 return
         self._busy = False
 
     def _begin(self, letters: list[Letter]) -> bool:
-        """Work on letters; whether that is done already, as it takes no time."""
+        """Begin to process letters; return True if that took no time and is done."""
         self._busy = True
         if (
             self._paused
@@ -348,7 +349,7 @@ class CommandQueue:
         return True
 
     def _next(self) -> list[Letter]:
-        """Return emergencies, all in one, unless it is the turn of somebody else."""
+        """Return all emergencies together, unless it is the turn of another message."""
         if not (self._emergencies or self._waiting.length):
             self._was_urgent = False
             return []
@@ -373,9 +374,9 @@ class CommandQueue:
         return None
 
     def _others_rest(self) -> bool:
-        """Return True if unknown senders have to wait although nobody else does.
+        """Return True if strangers have to wait although nobody else does.
 
-        Behind a message of the holder there is most time until its next one.
+        Right after a message of the holder there is most time until its next one.
         """
         behind_holder = self._busy and self._last is HOLDER
         until = self._rested + (0.0 if behind_holder else AFTER_HOLDER)
@@ -392,7 +393,8 @@ class CommandQueue:
             self._work()
 
     def _finish(self, letters: list[Letter]) -> None:
-        """Finish processing, and any emergency that came meanwhile."""
+        """Finish processing, including emergencies that came meanwhile."""
+        # The same list: emergencies that arrived during the processing are in it, and answered.
         if letters is self._emergencies:
             self._emergencies = []
         for letter in letters:
@@ -408,7 +410,7 @@ def _is_emergency(data: bytes) -> bool:
     return message is not None and isinstance(message.body, Emergency)
 
 
-BLOCK = 256  # draws made at once
+BLOCK = 256  # random numbers drawn at once
 
 
 class ServiceLaw(Config):
@@ -445,6 +447,7 @@ class ServiceLaw(Config):
             shape = self.cv**-2
             return self.mean_s / shape * rng.standard_gamma(shape, count)
         spread = math.sqrt(math.log1p(self.cv**2))
+        # The shift by half the variance of the logarithm keeps the mean at `mean_s`.
         draws = np.exp(spread * rng.standard_normal(count) - 0.5 * spread**2)
         return np.asarray(self.mean_s * draws)
 
@@ -461,7 +464,7 @@ ServiceTime = Annotated[
 
 
 def mean_of(service: float | ServiceLaw) -> float:
-    """Mean service time of all messages but the first [s]."""
+    """Return the mean service time of all messages but the first [s]."""
     return service.mean_s if isinstance(service, ServiceLaw) else service
 
 

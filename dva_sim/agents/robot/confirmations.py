@@ -1,4 +1,4 @@
-"""A robot's questions to the DVA about permissions, and the messages that wait for the answers."""
+"""Questions of a robot to the DVA about permissions, and the messages that wait for answers."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from dva_sim.agents.robot.decision_log import ASKS, NO_ANSWER
 from dva_sim.protocol import messages as m
 
 PER_CONNECTION = (
-    2  # messages of a connection that may wait: a device sends one at a time, perhaps again
+    2  # maximum waiting messages of a connection: devices send one at a time, perhaps repeated
 )
-PER_TIMEOUT = 3.0  # a message waits for this part of the time-out of a request, or longer
+PER_TIMEOUT = 3.0  # a message waits at least the time-out of a request divided by this
 
 
 @dataclass(eq=False)
 class Waiting:
-    """A message that waits for the DVA to say what its sender may do.
+    """Message that waits until the DVA has confirmed what its sender may do.
 
     Attributes:
         letter: The message.
-        reader: Its sender, if it wants to read sensors; None: it wants to act.
+        reader: Its sender, if it asks to read sensors; None: it asks to act.
         asked: True if the question under way was asked after the message had arrived.
     """
 
@@ -37,11 +37,11 @@ class Confirmations:
     """Asks the DVA the questions of a robot's controller, and holds messages until it has answered.
 
     Args:
-        device: The robot's.
-        controller: Its decider.
+        device: The robot's device.
+        controller: The robot's controller.
         decide: Callback for the answer of the DVA.
         conclude: Callback for a message that has waited; it does not wait again.
-        happened: Called when a question is asked, and when one has failed.
+        happened: Callback when a question is asked, and when one has failed.
     """
 
     def __init__(
@@ -97,12 +97,13 @@ class Confirmations:
         return [wait for wait in self._waiting if wait.reader == reader]
 
     def _answered(self, reply: m.Reply) -> None:
-        if self._device.silent:  # its computer hangs, or has no power: it has not heard that
+        if self._device.silent:  # the computer hangs or has no power, so it cannot hear
             self._failed()
             return
         question = self._inquiry.asked
         of = self._waiting_for(question) if question is not None else []
         settled = [wait for wait in of if wait.asked]
+        # Only messages older than the question are settled: a later one may refer to a later grant.
         if not self._decide(reply).waits:
             self._release(settled)
         self.ask()

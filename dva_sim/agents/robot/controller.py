@@ -16,10 +16,10 @@ from dva_sim.agents.robot.inquiry import Inquiry
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
 
-LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
-ENDS = "done", "failed"  # how a mission ends
-MAX_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
-INQUIRY_WAIT_S = 3.0  # minimum time for which an order waits for the DVA's word on its sender [s]
+LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this [s]
+ENDS = "done", "failed"  # states that end a mission
+MAX_OBSERVERS = 64  # maximum devices that read sensors without holding the robot
+INQUIRY_WAIT_S = 3.0  # minimum time for which an order waits for the DVA's answer [s]
 
 
 class Mode(StrEnum):
@@ -30,7 +30,7 @@ class Mode(StrEnum):
     TELEOPERATION = "Teleoperation"
 
 
-IDLE, MISSION, TELEOPERATION = Mode  # a member is looked up in its class fifteen times as slowly
+IDLE, MISSION, TELEOPERATION = Mode  # globals: looking a member up is fifteen times as slow
 
 
 class TimedSetPoint(NamedTuple):
@@ -57,8 +57,8 @@ class Decision(NamedTuple):
         text: Reason in words.
         set_point: The new set point, or None to leave it.
         content: Content of the reply.
-        waits: True if it holds only until the DVA has answered: the DVA must be asked, and the
-            message decided on again then.
+        waits: True if the decision is provisional: the DVA must be asked, and the message decided
+            on again after its answer.
     """
 
     code: int
@@ -73,11 +73,12 @@ _make_decision = maker(Decision)
 
 @dataclass(frozen=True)
 class Limits:
-    """Time limits after which a robot no longer trusts what it was told.
+    """Time limits after which a robot no longer obeys a command.
 
     Attributes:
         watchdog: A command is in force for at most this long after its reception [s].
-        max_age: And for at most this long after the newest tick its sender had seen [s].
+        max_age: A command is in force for at most this long after the newest picture that its
+            sender had seen [s].
     """
 
     watchdog: float
@@ -86,20 +87,20 @@ class Limits:
 
 @dataclass
 class RobotController:
-    """The decider of one robot.
+    """Decision logic of one robot.
 
     Attributes:
         id_tag: The robot.
         dva: Id of the DVA: the only one whose grants count.
         limits: Watchdog and age limit.
-        camera_url: URL given to those who ask for the sensors.
-        sensors: The sensors it has.
+        camera_url: URL in the answer to requests for the sensors.
+        sensors: Sensors on board.
         clock_offset: Time of the robot's own clock at the run's start [s]; no other clock agrees
             with it.
         without_tick: Commands without `SeenTick` so far.
-        future_ticks: Commands with one that the robot's clock has not reached.
-        grant: The permission of its holder, as the DVA has confirmed it.
-        observers: Those to read its sensors, by device, likewise.
+        future_ticks: Commands with a `SeenTick` that the robot's clock has not reached.
+        grant: Permission of its holder, as the DVA has confirmed it.
+        observers: Permissions to read its sensors, by device, as the DVA has confirmed them.
         inquiry: Open questions to the DVA.
         by_hand: Person who drives it by hand, at the robot itself; None: nobody does.
         latch: Latch that an emergency closes; while it holds, no order moves the robot.
@@ -126,7 +127,7 @@ class RobotController:
     inquiry: Inquiry = field(default_factory=Inquiry)
     by_hand: str | None = None
     latch: EmergencyLatch = field(default_factory=EmergencyLatch)
-    _numbered: int = 0  # the session that `last_order_id` and `last_set_id` are of
+    _numbered: int = 0  # session to which `last_order_id` and `last_set_id` belong
 
     def tick(self, now: float) -> int:
         """Return the robot's own clock [ms]."""
@@ -233,7 +234,7 @@ class RobotController:
         for everybody else, until it is let go, an emergency comes, or nothing is heard for long.
 
         Args:
-            who: Stays on this side of the network.
+            who: Name of the person, which is never sent over the network.
             now: Time [s].
             moving: True while the robot's wheels still turn.
         """
@@ -253,12 +254,12 @@ class RobotController:
         return Decision(m.OK, set_point=STANDSTILL)
 
     def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
-        """Return a set point of whom the robot is in the hands of; in force until the watchdog.
+        """Return the set point of the person who drives by hand; in force until the watchdog.
 
         Args:
             who: Person, by the name under which the robot was taken.
-            speed: [m/s]; not negative.
-            turn_rate: [rad/s]
+            speed: Speed [m/s]; not negative.
+            turn_rate: Turn rate [rad/s].
             now: Time [s].
         """
         if self.by_hand is None or self.by_hand != who:
@@ -295,14 +296,14 @@ class RobotController:
         return Decision(m.OK, "released")
 
     def let_go(self, who: str) -> Decision:
-        """Give the robot up; the word of a hand that did not drive changes nothing."""
+        """Give the robot up; a request by anyone but its driver changes nothing."""
         if self.by_hand is None or self.by_hand != who:
             return Decision(m.WRONG_MODE, "it is not in this hand")
         self._idle("")
         return Decision(m.OK, set_point=STANDSTILL)
 
     def mission_changed(self, state: str, left: int, reason: str) -> bool:
-        """Hear from the robot how its mission goes on; return True if that is news.
+        """Take the state of the mission from its pilot; return True if it has changed.
 
         Args:
             state: State as in `MissionStatus`; `done` and `failed` end the mission.
@@ -317,7 +318,7 @@ class RobotController:
         return self.mission_status != before
 
     def _idle(self, why: str) -> None:
-        """Stand by; a mission that was still going on has failed, and this is `why`."""
+        """Become idle; a mission that was still under way fails, for the reason `why`."""
         status = self.mission_status
         if self.mode is MISSION and status.mission_state not in ENDS:
             left = status.waypoints_left
@@ -328,7 +329,7 @@ class RobotController:
         self.by_hand = None
 
     def _released(self, message: m.Message) -> Decision:
-        """Accept a release as a reason to ask the DVA, which alone can say so."""
+        """Accept a release as a reason to ask the DVA, whose answer alone counts."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA releases: send it the request")
         if not self.latch.holds:
@@ -336,10 +337,7 @@ class RobotController:
         return Decision(m.OK, "takes effect when the DVA has confirmed it")
 
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
-        """Take a grant as a reason to ask the DVA.
-
-        It takes effect when that has confirmed it (S2).
-        """
+        """Take a grant as a reason to ask the DVA; it takes effect once confirmed (S2)."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
         if body.level == "sensors":
@@ -350,7 +348,7 @@ class RobotController:
         return Decision(m.OK, "takes effect when the DVA has confirmed it")
 
     def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
-        """End a session that is over, or said to be, at once; the DVA may restore it.
+        """End a session at once if it is said to be over; the DVA may restore it.
 
         A forged revocation stops a drive, as an emergency would, but takes the robot from nobody.
         """
@@ -366,7 +364,7 @@ class RobotController:
         return self._is_held(None)
 
     def _dva_answered(self, body: m.Reply) -> Decision:
-        """Apply an answer of the DVA: nothing else gives anybody the robot.
+        """Apply an answer of the DVA, which alone can change the holder.
 
         "Nobody holds it" does not end a drive: a DVA that has lost its memory may say so.
         """
@@ -399,12 +397,13 @@ class RobotController:
         current = self.grant
         self.grant = grant
         if grant is not None and current is not None and grant.session == current.session:
-            return Decision(m.OK)  # the holder may have moved
+            return Decision(m.OK)  # the same holder, perhaps at another address
         if grant is not None and grant.session != self._numbered:
+            # A holder's message numbers begin anew with its session.
             self.last_order_id = 0
             self.last_set_id = 0
             self._numbered = grant.session
-        if self.owner is None:  # also where it is in somebody's hand, who goes on
+        if self.owner is None:  # also when driven by hand, which continues
             return Decision(m.OK)
         self._idle("revoked")
         return Decision(m.OK, set_point=STANDSTILL)
@@ -416,7 +415,7 @@ class RobotController:
         return Decision(m.BUSY, f"this robot serves at most {MAX_OBSERVERS} observers")
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
-        """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
+        """Decide on a subscription to a sensor; permissions name each sensor (S5)."""
         grants = self._grants_of(message.source)
         if body.sensor not in {sensor.name for sensor in self.sensors}:
             names: Iterable[str] = (sensor.name for sensor in self.sensors)
@@ -437,10 +436,7 @@ class RobotController:
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
-        """Take an offer, or an award, which moves nothing.
-
-        An operator has to drive.
-        """
+        """Decide on an offer or an award, which move nothing: an operator has to drive."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
         if isinstance(message.body, m.TaskAward) and self.latch.holds:
@@ -512,6 +508,7 @@ class RobotController:
         refusal = refusal or self._order(message)
         if refusal is not None:
             return refusal
+        # Commands sent before this start must not act after it.
         self.last_set_id = max(self.last_set_id, message.message_id)
         if again:
             return Decision(m.OK, "already started")
@@ -531,11 +528,12 @@ class RobotController:
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
         self.last_set_id = message.message_id
-        if arrived <= self.emergency_at:  # a start that it had overtaken has been accepted since
+        if arrived <= self.emergency_at:  # later starts may have been accepted since
             return Decision(m.STALE, "sent before the emergency")
         until = arrived + self.limits.watchdog
         if body.seen_tick is None:
             self.without_tick += 1
+        # A tick ahead of the robot's own clock would keep a command fresh for ever.
         elif body.seen_tick > self.tick(now):
             self.future_ticks += 1
             return Decision(m.STALE, "no picture of that tick was taken yet")
@@ -554,7 +552,7 @@ class RobotController:
         if refusal is not None:
             return refusal
         if self.mode is IDLE and self.by_hand is None:
-            # After its computer hung, its motors may still have what they were told before.
+            # After its computer hung, its motors may still obey their last set point.
             return Decision(m.OK, "not in teleoperation", STANDSTILL)
         if self.mode is not TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")

@@ -1,4 +1,4 @@
-"""Log of a robot controller's inputs and decisions: kept as lines of JSON, and replayed."""
+"""Log of a robot controller's inputs and decisions, as lines of JSON, and its replay."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ STANDS = "stands"
 HANGS = "hangs"
 ASKS = "asks the DVA"
 NO_ANSWER = "no answer of the DVA"
-HAND = "hand"  # whose that was is no matter of a trace
+HAND = "hand"  # name used in a replay: a trace does not record who drove by hand
 
 
 class DecisionLog:
-    """Writes what one controller decides; each line is in its file before the next decision.
+    """Log of one controller's decisions; each line is in its file before the next decision.
 
     Args:
-        to: The file, whose folder must be there; or what takes each line.
+        to: The file, whose folder must exist; or a callback for each line.
         controller: Controller to log.
     """
 
@@ -98,7 +98,7 @@ class DecisionLog:
 def replay(
     path: Path, lines: Sequence[str | bytes] | None = None
 ) -> Iterator[tuple[m.Message, Decision, Decision]]:
-    """Ask a fresh controller the same again.
+    """Give a new controller the same inputs again.
 
     Args:
         path: The file.
@@ -133,6 +133,7 @@ def replay(
             else:
                 decision = _again(controller, entry)
         except _BROKEN as error:
+            # The file may come from anywhere, so each value in it may be wrong.
             problem = f"is no line of a robot's trace: {_in_words(error)}"
             raise ConfigError(problem, path, number) from error
         if decision is not None:
@@ -151,7 +152,7 @@ def _in_words(error: Exception) -> str:
 def _again(
     controller: RobotController, entry: dict[str, Any]
 ) -> tuple[m.Message, Decision, Decision] | None:
-    """Let it happen once more; a message, and what is decided about it then and now."""
+    """Apply an entry; return a message's old and new decision, None for other entries."""
     if "message" in entry:
         return _ask_again(controller, entry)
     now = _value(entry, "now", float, int)

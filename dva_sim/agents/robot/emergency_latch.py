@@ -1,4 +1,4 @@
-"""Latch of a robot: once an emergency has stopped it, only a person lets it go on.
+"""Latch of a robot: after an emergency it takes no orders until it is released.
 
 Without keys anybody can claim to be the DVA. A release is therefore read only from the DVA's answer
 to the robot's own request, and it counts only for the newest emergency that the request named.
@@ -14,7 +14,7 @@ from dva_sim.protocol import messages as m
 
 PERSON: Final = "person"
 DRIVE: Final = "drive"
-MAX_STOP_S = 1e6  # the protocol's limit
+MAX_STOP_S = 1e6  # longest stop that a message can state [s]
 
 
 @dataclass
@@ -30,7 +30,7 @@ class EmergencyLatch:
         since: Time of the first emergency [s].
         tick: The robot's own clock at the newest emergency [ms].
         released: Person who released it last.
-        released_by: Rule of this emergency, as far as the DVA has said.
+        released_by: Rule of this emergency, once the DVA has stated it.
     """
 
     rule: m.ReleasedBy | None = None

@@ -1,7 +1,7 @@
 """Faults of a robot that can be injected and removed while it runs.
 
-Nothing of it is chance, and nothing of it is in the robot until somebody asks for it: a run without
-faults does what it did before. What is wrong is said in the robot's story, and so is its end.
+No fault is random, and none is active until it is injected: a run without faults stays as it was.
+The start and end of each fault appear in the robot's story.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.network.messaging import Request
 
-SLOWEST = 3.0  # a message may be made to take a robot's computer so long [s]: PiBot's longest
+SLOWEST = 3.0  # maximum injected processing time of a message, PiBot's longest [s]
 Lost = Callable[[str, bytes], object]
 
 
@@ -46,7 +46,7 @@ class RobotFaults:
         return self.processing_s is not None or any(flags)
 
     def slow_down(self, seconds: float | None) -> None:
-        """Let each message take the robot's computer so long; None: as before."""
+        """Set the processing time of each message [s]; None: the usual one."""
         inbox = self._robot.inbox
         if self.processing_s is None:
             self._usual = inbox.service
@@ -56,7 +56,7 @@ class RobotFaults:
         self._tell(f"fault: processing of a message takes {text}")
 
     def usually(self, service: Callable[[], float]) -> None:
-        """Let a message usually take another time from now on: what counts if nothing is wrong."""
+        """Set the usual processing time, which applies while no fault overrides it."""
         self._usual = service
         if self.processing_s is None:
             self._robot.inbox.service = service

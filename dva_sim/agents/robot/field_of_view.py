@@ -1,4 +1,4 @@
-"""A robot's camera: which hazards are in its picture, and how far it sees through smoke.
+"""Field of view of a robot's camera: visible hazards, and visibility in smoke.
 
 References:
     Contrast falls with the optical depth as exp(-depth): H. Koschmieder, 1924.
@@ -17,7 +17,7 @@ from dva_sim.kernel.makers import maker
 
 
 class HazardSpot(NamedTuple):
-    """A hazard as the camera may see it: kind, place and radius [m].
+    """Hazard as the camera may see it: kind, place and radius [m].
 
     Attributes:
         shines: True if it is visible through smoke.
@@ -33,7 +33,7 @@ class HazardSpot(NamedTuple):
 make_spot = maker(HazardSpot)
 
 
-OPAQUE_DEPTH_M = 0.5  # smoke so far before the camera stands between it and everything [m]
+OPAQUE_DEPTH_M = 0.5  # depth of smoke right before the camera, which hides everything beyond [m]
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class FieldOfView:
     def visibility(self, x: float, y: float, heading: float) -> float:
         """Return how far things that do not glow are visible from a pose [m, rad]; at most `CLEAR`.
 
-        By the thicker of the smoke just before the camera and that along its axis: clean air
-        beyond a wall lets nobody see through the smoke before it.
+        It depends on the thicker of the smoke right before the camera and that along its axis:
+        clear air beyond a wall does not help to see through the smoke before it.
         """
         if not self.hazy():
             return CLEAR

@@ -1,4 +1,4 @@
-"""Questions of a robot to the DVA about who may act on it: which is next, and when.
+"""Questions of a robot to the DVA about its permissions: which is next, and when.
 
 Without keys anybody can claim to be the DVA. What is claimed in its name is therefore only a reason
 to ask: the answer comes over a connection that the robot itself has opened, and it alone counts.
@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 
 from dva_sim.protocol import messages as m
 
-BURST = 4.0  # questions that may follow each other at once
+BURST = 4.0  # maximum questions in immediate succession
 RATE = 4.0  # sustained rate limit [1/s]
-MAX_READERS = 64  # devices that wait to be asked about
-MAX_OVER = 1000  # sessions said to be over while one question is under way
+MAX_READERS = 64  # maximum devices about which a question is pending
+MAX_OVER = 1000  # maximum sessions noted as over while one question is under way
 CLOCK_TOLERANCE_S = 1e-5  # tolerance of a query for clocks that round to microseconds [s]
 
 
@@ -32,9 +32,9 @@ class Inquiry:
 
     asked: m.GetGrant | None = None
     asked_at: float = -math.inf
-    _holder: bool = False  # whether the holder is to be asked about
-    _claimed: str | None = None  # the newest that was claimed to be it
-    _by_name: bool = False  # an older DVA is asked about one device by its id
+    _holder: bool = False  # whether the question about the holder is pending
+    _claimed: str | None = None  # latest device that was claimed to be the holder
+    _by_name: bool = False  # whether an older DVA has to be asked about one device by id
     _readers: OrderedDict[str, None] = field(default_factory=OrderedDict)
     _readers_next: bool = False
     _over: set[int] = field(default_factory=set)
@@ -57,7 +57,7 @@ class Inquiry:
             setattr(self, name, getattr(fresh, name))
 
     def about_holder(self, claimed: str | None) -> None:
-        """Open the question who holds the robot.
+        """Make the question about the robot's holder pending.
 
         Args:
             claimed: Id of the device that is said to be the holder, or acts as if it were.
@@ -66,7 +66,7 @@ class Inquiry:
         self._claimed = claimed or self._claimed
 
     def about_reader(self, device: str) -> None:
-        """Open the question which sensors a device may read."""
+        """Make the question pending which sensors a device may read."""
         if len(self._readers) < MAX_READERS:
             self._readers[device] = None
 
@@ -76,14 +76,14 @@ class Inquiry:
             self._over.add(session)
 
     def due(self, now: float) -> float:
-        """Return when the next question may be asked; inf: there is none, or one is under way."""
+        """Return when the next question may be asked; infinite while none can be."""
         if self.asked is not None or not (self._holder or self._readers):
             return math.inf
         lacking = 1.0 - self._allowed(now)
         return now if lacking <= CLOCK_TOLERANCE_S else now + lacking / RATE
 
     def next(self, now: float) -> m.GetGrant | None:
-        """Take the next question, which is then under way, if one may be asked now."""
+        """Return the next question, which is then under way, if one may be asked now."""
         if self.due(now) > now:
             return None
         self._left = self._allowed(now) - 1.0
@@ -93,6 +93,7 @@ class Inquiry:
         else:
             self.asked = m.GetGrant(self._claimed if self._by_name else None)
             self._holder = False
+        # Readers and the holder take turns: neither can keep the other waiting.
         self._readers_next = not self._readers_next
         self.asked_at = now
         self._over.clear()
@@ -101,8 +102,9 @@ class Inquiry:
     def answered(self, reply: m.Reply) -> m.GetGrant | None:
         """Take the answer to the question under way; return that question, if this settles it.
 
-        It does not where the DVA must be asked again: it does not know the robot yet, or only
-        questions about one device (before 1.6), or it may not have known that a session is over.
+        The DVA must be asked again if it does not know the robot yet, if it understands only
+        questions about one device (before 1.6), or if its answer may be older than the end of a
+        session.
         """
         question = self.asked
         self.asked = None
@@ -132,6 +134,7 @@ class Inquiry:
             self._again(question)
 
     def _was_over(self, session: int) -> bool:
+        # With more ends than were kept, any session may be over.
         return session in self._over or len(self._over) > MAX_OVER
 
     def _again(self, question: m.GetGrant) -> None:

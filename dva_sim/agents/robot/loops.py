@@ -22,11 +22,11 @@ from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
 
-SENSOR_REACH = 8.0  # in which others are seen [m]; assumed, as that of the lidar
+SENSOR_REACH = 8.0  # maximum distance at which others are seen [m]; assumed, as for the lidar
 
 
 class Surrounded:
-    """A robot's body among others: what its loops look at and act on.
+    """Body of a robot and its surroundings, as its loops observe and move them.
 
     Args:
         clock: The run's clock.
@@ -50,11 +50,11 @@ class Surrounded:
 
 
 class CollisionGuardedDrive:
-    """Obeys set points as far as the collision guard allows, looking again all the time.
+    """Drive that obeys set points as far as the collision guard allows, checked periodically.
 
     Args:
-        around: The robot and who is near.
-        controller: Says whether it is still driven.
+        around: The robot and its surroundings.
+        controller: Controller, which knows whether the robot is still driven.
     """
 
     def __init__(self, around: Surrounded, controller: RobotController) -> None:
@@ -88,10 +88,10 @@ class CollisionGuardedDrive:
 
 
 class MissionLoop:
-    """Drives missions, one at a time.
+    """Loop that drives missions, one at a time.
 
     Args:
-        around: The robot and who is near.
+        around: The robot and its surroundings.
         controller: Controller that receives the state of the mission.
         observe: Function that returns the current observation.
         charge: Share of the battery's charge that is left.
@@ -134,6 +134,7 @@ class MissionLoop:
             if self._controller.mode is not Mode.MISSION or number != self._number:
                 return False  # stopped, or another mission has begun since
             step = pilot.step(self._look())
+            # Valid for two periods: if the loop ends, the motors stop by themselves.
             self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
             if self._controller.mission_changed(step.state, step.left, step.reason):
                 self._on_news()

@@ -1,7 +1,6 @@
-"""Short things that a robot on a mission does between two pieces of its way.
+"""Manoeuvres of a robot on a mission between two pieces of its path.
 
-It gets out of a jam, steps aside for somebody, or looks at the place of an event: from where,
-which way, and for how long.
+It gets out of a jam, steps aside for somebody, or inspects the place of an event.
 """
 
 from __future__ import annotations
@@ -21,26 +20,26 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 STANDSTILL = Intent(0.0, 0.0)
-GAIN = 2.0  # of turning towards a heading [1/s]
-FACING = 0.1  # nearer than this one faces it [rad]
+GAIN = 2.0  # turn rate per error of the heading [1/s]
+FACING = 0.1  # a robot faces a place if its heading is off by less than this [rad]
 MANOEUVRE_MPS = 0.25  # speed of manoeuvres [m/s]; assumed
-GET_AWAY = 0.5  # way driven after a jam before planning again [m]; assumed
-HEADINGS = 16  # looked at for a way out
-TRIED_WITHIN_RAD = 0.5  # a heading so near one that did not help is not tried again [rad]
-REACHED_WITHIN_M = 0.15  # a place beside the way is reached from here [m]
-FREE_FOR = 1.0  # the way must be free for so long before a robot goes on [s]; assumed
-MAX_RECOVERY = 12.0  # [s]; assumed
-MAX_ASIDE = 30.0  # [s]; assumed
-STANDS_BELOW_MPS = 0.05  # slower people stand [m/s]; assumed
-NOBODY_MOVES = 4.0  # who stands for so long will not pass [s]; assumed
-PASSED = 0.10  # gap left between the way and who has passed [m]
+GET_AWAY = 0.5  # distance driven after a jam before planning again [m]; assumed
+HEADINGS = 16  # headings that are compared for a way out
+TRIED_WITHIN_RAD = 0.5  # headings this near one that did not help rank last [rad]
+REACHED_WITHIN_M = 0.15  # distance at which a place beside the path counts as reached [m]
+FREE_FOR = 1.0  # time for which the path must be free before a robot goes on [s]; assumed
+MAX_RECOVERY = 12.0  # maximum duration of a way out of a jam [s]; assumed
+MAX_ASIDE = 30.0  # maximum duration of stepping aside [s]; assumed
+STANDS_BELOW_MPS = 0.05  # slower bodies count as standing [m/s]; assumed
+NOBODY_MOVES = 4.0  # others that stand for this long will not pass [s]; assumed
+PASSED = 0.10  # gap between the path and others at which it counts as free [m]
 
 
 class Sensed(NamedTuple):
     """State of a robot as known by its sensors and its map.
 
     Attributes:
-        now: [s]
+        now: Time [s].
         view: Position, and content of its picture.
         nearby: Others in sight and within reach.
         jammed: True if it drives against something and does not move.
@@ -66,7 +65,7 @@ def turn_to(view: Observation, heading: float, most: float) -> Intent:
 
 
 class Manoeuvre:
-    """Something that ends by itself.
+    """Manoeuvre that ends by itself.
 
     Attributes:
         state: State of the mission meanwhile.
@@ -86,7 +85,7 @@ class JamRecovery(Manoeuvre):
 
     Args:
         percept: Observation at the moment of the jam.
-        guard: Knows what is free.
+        guard: Guard that knows the free space.
         most_turn: Highest turn rate [rad/s].
         tried: Headings that did not help [rad].
     """
@@ -105,7 +104,7 @@ class JamRecovery(Manoeuvre):
         self.heading = self._way_out(percept, tried)
 
     def _way_out(self, percept: Sensed, tried: Sequence[float]) -> float:
-        """Return the freest heading; the less to turn, the better where several are free."""
+        """Return the heading with most free space; of equal ones that with the least turn."""
 
         def worth(heading: float) -> float:
             pose = (*percept.here, heading)
@@ -117,7 +116,7 @@ class JamRecovery(Manoeuvre):
         return max((percept.view.heading + turn for turn in turns), key=worth)
 
     def step(self, percept: Sensed) -> Intent | None:
-        """Turn, then drive; return True when far enough away, or when it takes too long."""
+        """Turn, then drive; None when far enough away, or when it takes too long."""
         if percept.now > self._until or math.dist(percept.here, self._start) > GET_AWAY:
             return None
         self._turned = self._turned or abs(wrap(self.heading - percept.view.heading)) < FACING
@@ -160,7 +159,7 @@ class Aside(Manoeuvre):
             self._moved = percept.now
         stays = self._arrived and percept.now - self._moved > NOBODY_MOVES
         if percept.now - self._free_since >= FREE_FOR or percept.now > self._until or stays:
-            return None
+            return None  # the path is free, time is up, or nobody will come past
         self._arrived = self._arrived or math.dist(percept.here, self._place) < REACHED_WITHIN_M
         if self._arrived:
             return Intent(0.0, 0.0)
@@ -185,16 +184,16 @@ class Aside(Manoeuvre):
         return True
 
 
-MATCH_WITHIN = 4.0  # a hazard so near the place of an event is the one reported there [m]
-KEEP_OFF = 1.2  # from here the place of an event is looked at [m]
-LOOK_FROM = 4.0  # an event in view no farther than this is looked at from here [m]; assumed
-FIRST_LOOK = 3.0  # with nothing in view for so long, it looks all around [s]; assumed
-LOOK_AROUND = 0.4  # turn rate meanwhile [rad/s]; assumed
-INSPECT_FOR = 120.0  # an inspection that nobody ends is done after this [s]; assumed
+MATCH_WITHIN = 4.0  # a hazard this near the place of an event is the one reported there [m]
+KEEP_OFF = 1.2  # distance from which the place of an event is inspected [m]
+LOOK_FROM = 4.0  # distance from which an event in view is inspected [m]; assumed
+FIRST_LOOK = 3.0  # time with nothing in view before it looks all around [s]; assumed
+LOOK_AROUND = 0.4  # turn rate of looking around [rad/s]; assumed
+INSPECT_FOR = 120.0  # time after which an inspection ends that nobody ends [s]; assumed
 
 
 class Inspection:
-    """Looks at one place.
+    """Inspection of one place.
 
     Args:
         event: Kind of the event.
@@ -219,7 +218,7 @@ class Inspection:
         self._heading = 0.0
 
     def begins(self, percept: Sensed) -> bool:
-        """Return True once the robot is where it can look from."""
+        """Return True once the robot has reached a place to look from."""
         if self._since == math.inf and self._is_at_view(percept):
             self._since = percept.now
         return self._since < math.inf

@@ -1,4 +1,4 @@
-"""A hand at a robot itself: it drives without messages, within the same limits and watchdog."""
+"""Manual control at a robot itself: without messages, within the same limits and watchdog."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dva_sim.protocol import messages as m
 
 
 class ManualControl:
-    """Lets one hand at a time drive a robot; its controller decides."""
+    """Manual control of a robot by one person at a time; its controller decides."""
 
     def __init__(self, robot: RobotAgent) -> None:
         self._robot = robot
@@ -41,7 +41,7 @@ class ManualControl:
         return decision
 
     def drive(self, who: str, speed: float, turn_rate: float) -> Decision:
-        """Take the speed [m/s] and turn rate [rad/s] that the hand wants."""
+        """Take the speed [m/s] and turn rate [rad/s] that the person wants."""
         robot = self._robot
         now = self._robot.device.clock.now
         if robot.device.silent:
@@ -52,7 +52,7 @@ class ManualControl:
         return decision
 
     def let_go(self, who: str) -> Decision:
-        """Stop the robot, which the hand gives up."""
+        """Stop the robot, which the person gives up."""
         robot = self._robot
         now = self._robot.device.clock.now
         decision = self._controller.let_go(who)

@@ -1,16 +1,16 @@
-"""Missions: how a robot gets somewhere by itself, and what it does about who is in the way.
+"""Missions: how a robot reaches places by itself, and what it does if somebody is in the way.
 
 Pure: from what the robot knows at a moment it decides the motion and the state of the mission.
-The rules, in the order in which they are asked:
+The rules, in the order in which they are applied:
 
 1. A battery that is nearly empty ends any mission but the way home.
-2. Who is jammed turns to where it is free, drives off a little, and takes another way; after
-   `MAX_JAMS` times without having reached a place in between, the mission fails.
-3. Past people and other robots it goes in a free lane (`avoidance`), slower beside people.
-4. Where no lane is free it stops short. Who has to let the other one go first steps aside until the
-   other has passed. Who is still blocked after `AROUND_AFTER` looks for a way around everybody in
-   sight, now and then; beside people who do not move it squeezes past after `SQUEEZE_AFTER`;
-   after `GIVE_UP_AFTER` it gives up.
+2. A jammed robot turns towards free space, drives a short distance, and takes another path; after
+   `MAX_JAMS` jams without reaching a place in between, the mission fails.
+3. It passes people and other robots in a free lane (`avoidance`), slower beside people.
+4. If no lane is free it stops short. If the other robot has the right of way, it steps aside until
+   that has passed. If it is still blocked after `AROUND_AFTER`, it looks now and then for a path
+   around everybody in sight; it squeezes past people who do not move after `SQUEEZE_AFTER`, and
+   gives up after `GIVE_UP_AFTER`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from dva_sim.worlds.planning import Disc, Planner
 
 Point = tuple[float, float]
 
-# The robot's own loop has no delay to speak of: a brisk, steady driver.
+# The robot's own loop has hardly any delay, so it steers more sharply than a person would.
 AUTOPILOT = replace(median_person(Population()), crossover=2.0, pace=1.0)
 
 
@@ -64,7 +64,7 @@ class MissionGoal:
     def of(
         cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point
     ) -> MissionGoal:
-        """Return the errand that a message asks for; `base` is the robot's own [m]."""
+        """Return the mission of a message in metres; `base` is the robot's own base [m]."""
         match mission:
             case m.Inspect():
                 place = to_xy(mission.position.latitude, mission.position.longitude)
@@ -75,21 +75,22 @@ class MissionGoal:
         return cls(goals, mission.laps if isinstance(mission, m.Patrol) else 1)
 
 
-PERIOD = 0.1  # of the robot's own loop [s]
-REACHED_WITHIN_M = 0.3  # a waypoint counts as reached from here [m]
-REACHED_IF_TAKEN_M = 1.8  # and from here if somebody stands on it [m]
+PERIOD = 0.1  # period of the robot's own loop [s]
+REACHED_WITHIN_M = 0.3  # distance at which a waypoint counts as reached [m]
+REACHED_IF_TAKEN_M = 1.8  # the same if somebody stands on the waypoint [m]
 RESERVE = 0.05  # charge below which a robot only goes home; assumed
 MAX_JAMS = 3  # recoveries between two waypoints; assumed
-NO_PROGRESS = 15.0  # on the way without getting on for so long is a jam, too [s]; assumed
-STOP_SHORT = 1.0  # way left free before who is in the way [m]; assumed
-STANDS_BELOW_MPS = 0.05  # who is slower stands [m/s]
-SAY_AFTER = 0.5  # [s]; assumed, as all of these
-ASIDE_AFTER = 1.0  # [s]
-AROUND_AFTER = 4.0  # [s]
-AROUND_AGAIN = 6.0  # [s]
-DETOUR_MARGIN_M = 0.08  # a way around somebody keeps so much more [m]
-SQUEEZE_AFTER = 10.0  # [s]
-GIVE_UP_AFTER = 60.0  # [s]
+NO_PROGRESS = 15.0  # time without progress that counts as a jam, too [s]; assumed
+STOP_SHORT = 1.0  # distance left free before an obstacle [m]; assumed
+STANDS_BELOW_MPS = 0.05  # slower bodies count as standing [m/s]
+# Waits of a blocked robot, from when it was blocked [s]; all assumed.
+SAY_AFTER = 0.5  # until it reports that somebody is in the way [s]
+ASIDE_AFTER = 1.0  # until it steps aside for a robot that goes first [s]
+AROUND_AFTER = 4.0  # until it looks for a path around [s]
+AROUND_AGAIN = 6.0  # between two such looks [s]
+DETOUR_MARGIN_M = 0.08  # additional gap of a path around somebody [m]
+SQUEEZE_AFTER = 10.0  # until it goes nearer to people [s]
+GIVE_UP_AFTER = 60.0  # until the mission fails [s]
 
 
 class PilotStep(NamedTuple):
@@ -102,14 +103,14 @@ class PilotStep(NamedTuple):
 
 
 class Pilot:
-    """Drives one mission.
+    """Pilot of one mission.
 
     Args:
         errand: Mission to drive.
         planner: The robot's map.
         guard: Keeps it from driving into anything; knows its radius.
         name: Name of the robot.
-        reach: Its top speed and highest turn rate.
+        reach: Top speed and highest turn rate of the robot.
         turning_radius: Radius of its sharpest curve [m]; 0: it turns on the spot.
     """
 
@@ -153,8 +154,8 @@ class Pilot:
         self._blocked_since = math.inf
         self._looked_around = -math.inf
         self._left_aside: str | None = None
-        self._moved = -math.inf  # when who is in the way was last seen to move [s]
-        self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
+        self._moved = -math.inf  # when the obstacle was last seen to move [s]
+        self._progress = (math.inf, math.inf)  # shortest remaining path [m], and since when [s]
 
     def step(self, percept: Sensed) -> PilotStep:
         """Return what to do now."""
@@ -169,7 +170,7 @@ class Pilot:
             return self._look(percept, self._inspection)
         return self._travel(percept)
 
-    # --- words -------------------------------------------------------------------------
+    # --- parts of a step ---------------------------------------------------------------
 
     @property
     def _goal(self) -> Point:
@@ -184,7 +185,7 @@ class Pilot:
         return PilotStep(STANDSTILL, state, 0 if state == "done" else self._left, reason)
 
     def _move(self, percept: Sensed, intent: Intent, state: str, reason: str = "") -> PilotStep:
-        """Go, but never into anything, and gently beside people."""
+        """Return the step of a motion, slowed before obstacles and beside people."""
         pose = (*percept.here, percept.view.heading)
         speed = pace_among(percept.nearby, percept.here, self._radius, intent.speed)
         speed = self._guard.limit(pose, speed, intent.turn_rate, percept.nearby)
@@ -213,7 +214,7 @@ class Pilot:
         return self._move(percept, self._drive(Route(lane.points), percept), "under_way")
 
     def _drive(self, route: Route, percept: Sensed) -> Intent:
-        """Return the way's next intent; a car drives its sharpest curve where others turn."""
+        """Return the next motion along a route; where others turn, a car drives a sharp curve."""
         speed, turn_rate = self._driver.drive(
             route, View(percept.now, percept.view, PERIOD), REACHED_WITHIN_M
         )
@@ -223,6 +224,7 @@ class Pilot:
 
     def _plan(self, percept: Sensed) -> Route | None:
         points = self._planner.path(percept.here, self._goal, self._closed)
+        # Everything may be closed by now: an old obstacle on the map must not end the mission.
         if points is None and self._closed:
             self._closed = []
             points = self._planner.path(percept.here, self._goal)
@@ -247,7 +249,7 @@ class Pilot:
         return percept.now - since > NO_PROGRESS
 
     def _look(self, percept: Sensed, inspection: Inspection) -> PilotStep:
-        """Face the event and wait for somebody who says what next."""
+        """Face the event and wait for the next order."""
         finding = inspection.finding(percept)
         if inspection.is_over(percept):
             return self._end("done", finding)
@@ -256,7 +258,7 @@ class Pilot:
     # --- in the way --------------------------------------------------------------------
 
     def _with_patience(self, percept: Sensed) -> Sensed:
-        """Let a robot that has waited for long go nearer to people, until none is in sight."""
+        """Let a robot that has waited long go nearer to people, until none is in sight."""
         waited = percept.now - self._blocked_since > SQUEEZE_AFTER
         people = any(o.kind == "person" for o in percept.nearby)
         self._squeezing = people and (self._squeezing or waited)
@@ -287,7 +289,7 @@ class Pilot:
             if around is not None:
                 return around
         intent = self._drive(Route(blocked.lane.points), percept)
-        # People are walked past if there is room at all: turning aside takes longer than they do.
+        # Past people it drives on if there is room at all: stepping aside would take longer.
         apart = (
             math.dist(percept.here, (blocked.by.x, blocked.by.y)) if person else blocked.distance
         )
@@ -306,7 +308,7 @@ class Pilot:
         return is_stationary and left < REACHED_IF_TAKEN_M and gap < self._radius + other.keep
 
     def _lets_pass(self, percept: Sensed, other: Nearby) -> bool:
-        """Return True if it should step aside: once for each who goes first and does not leave."""
+        """Return True if it should step aside: once for each robot that goes first and stays."""
         x, y = percept.here
         apart = math.dist(percept.here, (other.x, other.y))
         goes_away = (other.vx * (other.x - x) + other.vy * (other.y - y)) > 0.05 * apart
@@ -348,6 +350,7 @@ class Pilot:
         nose = self._radius + 0.1
         x = percept.view.x + nose * math.cos(heading)
         y = percept.view.y + nose * math.sin(heading)
+        # The obstacle before its nose is not on the map: the next path has to avoid that place.
         self._closed.append(Disc(x, y, 0.1))
         recovery = JamRecovery(percept, self._guard, self._reach.turn_rate, [heading, *self._tried])
         self._tried.append(recovery.heading)

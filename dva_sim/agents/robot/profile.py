@@ -121,7 +121,7 @@ def read_robot(document: Document) -> RobotProfile:
 
 
 def _convex(corners: tuple[Corner, ...]) -> bool:
-    """Return True if the corners go once around the origin, always to the left."""
+    """Return True if the corners go once around the origin, always turning left."""
     turned = 0.0
     for number, (bx, by) in enumerate(corners):
         ax, ay = corners[number - 1]
@@ -129,4 +129,5 @@ def _convex(corners: tuple[Corner, ...]) -> bool:
         if (bx - ax) * (cy - by) <= (by - ay) * (cx - bx) or ax * by <= ay * bx:
             return False
         turned += math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    # One turn is 2 pi, about 6.3: two turns, as of a star, would be twice that.
     return len(corners) > 2 and turned < 7.0

@@ -60,13 +60,13 @@ DVAS_ONLY = (
 )
 RESTRICTED = HOLDERS_ONLY | DVAS_ONLY
 DRIVING = m.StartTeleOp, m.SetTeleOp
-MAX_HELD = 1e6  # [s]
-WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
-STATUS_PERIOD = 1.0  # [s]
-WAKES_UP = 1.0  # what arrives so soon after a sleep may have been sent before its end [s]
-EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
-EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
-STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
+MAX_HELD = 1e6  # longest holding time that a message can state [s]
+WHATEVER_WAITS = 1 << 40  # a size below which no backlog of the link holds a message back [B]
+STATUS_PERIOD = 1.0  # time between two status messages [s]
+WAKES_UP = 1.0  # what arrives this soon after a sleep may have been sent before its end [s]
+EXPECTED_SPEED = 0.35  # speed under teleoperation, for bids; the DVA expects the same [m/s]
+EXPECTED_READY = 4.0  # time until an operator drives, for bids; the DVA expects the same [s]
+STANDING = 0.02  # slower wheels count as still [m/s, rad/s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +124,7 @@ class RobotAgent:
         trace: Trace that receives each decision, if there is one.
         unfit: Reason why it cannot be driven now; empty: it can.
         takes_missions: True if it drives missions by itself.
-        refuses: Made to refuse every command with this code: a fault that is planted.
+        refuses: Injected fault: every command is refused with this code.
         blind: Injected fault: the camera takes no pictures.
         drained: Injected fault: the battery counts as empty, whatever its charge.
         sensors: Sensors by name; each may be given another port.
@@ -163,7 +163,7 @@ class RobotAgent:
         self.blind = self.drained = False
         self._fared = m.OK
         self._held_since = 0.0
-        # Who holds it, and how that fares, as was published last.
+        # Holder and code of its newest command, as last published.
         self._last_published: tuple[str | None, int] = (None, m.WRONG_MODE)
         self.inbox = CommandQueue(
             clock=device.clock,
@@ -204,7 +204,7 @@ class RobotAgent:
     def start(self) -> None:
         """Begin to publish frames, status and mode changes."""
         clock = self.device.clock
-        self.device.connect(self.device.dva)  # what it will ask need not wait for that
+        self.device.connect(self.device.dva)  # ahead of the first question to the DVA
         clock.every(1.0 / self._setup.frame_rate, self._take_frame)
         clock.every(STATUS_PERIOD, self._publish_status)
 
@@ -294,7 +294,7 @@ class RobotAgent:
         self._confirmations.ask()
 
     def _obeys(self, dva: str) -> None:
-        """Believe another DVA from now on, and tell it who drives the robot, who goes on."""
+        """Obey another DVA from now on, and tell it the current driver, who continues."""
         self.controller.dva = dva
         self.device.connect(dva)
         grant = self.controller.grant
@@ -314,10 +314,10 @@ class RobotAgent:
         self.device.withdrawn = True
 
     def _woke(self, gap: float) -> None:
-        """Obey nothing of before a sleep, and nothing that was sent meanwhile."""
+        """Drop all orders from before a sleep, and those sent meanwhile."""
         self.device.tell(f"stands: its computer was suspended for {gap:.0f} s", "mode")
         self._stand()
-        self.controller.emergency_at += WAKES_UP  # until then it reads what has waited
+        self.controller.emergency_at += WAKES_UP  # the backlog of the sleep is read until then
 
     def _stand(self) -> None:
         """Stand idle until a new order, and publish that."""
@@ -351,8 +351,8 @@ class RobotAgent:
     def _admit(self, request: Request) -> m.Message | None:
         """Return a request that is worth waiting for; without power it hears none.
 
-        While somebody drives, what only that one may say is refused to strangers before it costs
-        any processing, unless a word of the DVA waits that may make one of them the holder.
+        While somebody drives, orders of strangers are refused before they cost any processing,
+        unless a message of the DVA waits that may make one of them the holder.
         """
         message = None if self.device.silent else self.device.admit(request)
         if message is None or not isinstance(body := message.body, RESTRICTED):
@@ -362,6 +362,7 @@ class RobotAgent:
         is_informed = self.inbox.hears_the_dva or self.controller.inquiry.is_open
         if (is_informed or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
             return message
+        # Decided at once, without the queue: strangers must not slow the holder down.
         letter = Letter(request.data, self.device.clock.now, request, message)
         answer = partial(self._reply, letter, waited=True)
         self.device.conclude(request, message, answer, at_once=True)
@@ -419,6 +420,7 @@ class RobotAgent:
             if self._confirmations.keep(letter, message):
                 self._confirmations.ask()
                 return None
+            # The list of waiting messages is full: the decision is final as it is.
             decision = self._decide(message, letter.arrived, waited=True)
         return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
@@ -490,7 +492,7 @@ class RobotAgent:
             self.trace.happened(what, self.device.clock.now)
 
     def _note_holder(self, message: m.Message, code: int) -> None:
-        """Note how the holder's commands fare; listeners hear of a change at once."""
+        """Note the code of the holder's newest command; a change is published at once."""
         holder = self._holder
         if isinstance(message.body, DRIVING) and message.source == holder:
             self._fared = code
@@ -509,7 +511,7 @@ class RobotAgent:
         return self._fared if self.controller.mode is TELEOPERATION else m.WRONG_MODE
 
     def _publish_holder(self) -> None:
-        """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
+        """Publish the holder: drivers that publish their commands get no replies."""
         network = self.device.network
         me = self.device.id_tag
         fares = self._fares
@@ -531,7 +533,7 @@ class RobotAgent:
         if was_held and not latch.holds:
             released_by = latch.released.label if latch.released else "a new start"
             self.device.tell(f"is released after an emergency by {released_by}", "mode")
-        self.device.clock.call_after(0.0, self._announce_emergency)  # once this is answered
+        self.device.clock.call_after(0.0, self._announce_emergency)  # after the reply
 
     def _announce_emergency(self) -> None:
         """Publish the latch, and ask the DVA for a release."""
@@ -542,7 +544,7 @@ class RobotAgent:
         self._ask_for_release()
 
     def _ask_for_release(self) -> None:
-        """Ask the DVA whether somebody has released the robot; one request is under way at most."""
+        """Ask the DVA whether a person has released the robot; one request at a time."""
         latch = self.controller.latch
         if not latch.holds or latch.rule == DRIVE:
             return
@@ -627,6 +629,7 @@ class RobotAgent:
             self.device.tell(f"is now in mode {mode}", "mode")
         if self._commands is not None:
             self._commands.close()
+            # Commands of the previous drive must not act in the next one.
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
         if mode is TELEOPERATION and self._pattern.published:
@@ -637,7 +640,7 @@ class RobotAgent:
         if self.controller.mission is not None:
             self._missions.begin(self.controller.mission, self.device.frame)
 
-    # --- what it does by itself --------------------------------------------------------
+    # --- periodic work -----------------------------------------------------------------
 
     def _take_frame(self) -> None:
         """Send a frame to the viewers; skip it while the last one still waits."""
@@ -649,6 +652,7 @@ class RobotAgent:
         frame = make_frame(self.observe(), self.device.clock.now)
         if self.filmed is not None:
             self.filmed(me, frame)
+        # The frame shows what was there before encoding; it is published once that is done.
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)
@@ -686,7 +690,7 @@ class RobotAgent:
         self.device.publish(MISSION, self.controller.mission_status)
 
     def _mission_news(self) -> None:
-        """Note that the mission stands otherwise than before; it may be over."""
+        """Publish that the state of the mission has changed; it may be over."""
         status = self.controller.mission_status
         self._publish_mission()
         if status.mission_state in ENDS:

@@ -1,13 +1,12 @@
-"""Sensors of a robot: what they make of what is there, how they fail, and who has subscribed.
+"""Sensors of a robot: their values, their faults, and their subscribers.
 
-A sensor samples at its own rate for all subscribers. Between the world and the value that is
-published stand, in this order: a first-order lag, noise, the ends of its range, and its
-resolution. The noise of a sample is keyed by the sensor and the number of the sample: that
-somebody reads one sensor, or reads it more often, changes no other value. A sensor with a lag is
-switched on by the first subscriber, shows what is there at once, and follows from then on.
+A sensor samples at its own rate for all subscribers. A published value is the true value after a
+first-order lag, noise, the limits of the range, and the resolution, in this order. The noise of a
+sample is keyed by the sensor and the number of the sample: reading one sensor, or reading it more
+often, changes no other value. A sensor with a lag is switched on by its first subscriber, shows the
+true value at once, and follows from then on.
 
-A sensor that is *lost* gives nothing from then on; one that is *stuck* gives its last values
-for ever.
+A *lost* sensor gives nothing any more; a *stuck* one gives its last values for ever.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
-MAX_SUBSCRIPTIONS = 64  # subscriptions at one robot
-FASTEST = 20.0  # values that a robot gives, at most [Hz]
-SLOWEST = 0.02  # values that a robot gives, at least [Hz]
+MAX_SUBSCRIPTIONS = 64  # maximum subscriptions at one robot
+FASTEST = 20.0  # highest rate of a subscription [Hz]
+SLOWEST = 0.02  # lowest rate of a subscription [Hz]
 
 
 @dataclass(frozen=True)
@@ -44,10 +43,10 @@ class SensorPort:
 
     Attributes:
         unit: Unit of its values.
-        read: Its values at a time [s]: 1 to 360, or none if it is lost.
+        read: Function that returns its 1 to 360 values at a time [s], or none if it is lost.
         fastest: Highest rate of values [Hz].
-        lags: True if a value depends on those before: then it samples while anybody listens,
-            however seldom.
+        lags: True if a value depends on earlier ones: then the sensor samples all the time while
+            it has a subscriber, however low the subscriber's rate.
     """
 
     unit: str
@@ -63,7 +62,7 @@ def sensor_topic(sensor: str, subscriber: str) -> str:
 
 @dataclass
 class _Subscribed:
-    """One subscription: how often [s], until when [s], and when the next value is due [s]."""
+    """Subscription: its period [s], its end [s], and when the next value is due [s]."""
 
     period: float
     until: float
@@ -77,7 +76,7 @@ class SensorSubscriptions:
         device: The robot.
         sensors: Sensors by name.
         tick: The robot's own clock [ms], at a time [s].
-        may_read: Return True if a device may read a sensor now, by its id and the sensor's name.
+        may_read: Predicate: True if a device, by its id, may read a sensor, by its name, now.
     """
 
     def __init__(
@@ -95,7 +94,7 @@ class SensorSubscriptions:
         self._ticking = False
 
     def subscribe(self, subscriber: str, wish: m.DevSub) -> tuple[int, str]:
-        """Begin, renew, change or end a subscription: reply code, and why."""
+        """Begin, renew, change or end a subscription; return reply code and reason."""
         key = wish.sensor, subscriber
         now = self._device.clock.now
         if wish.frequency == 0.0:
@@ -121,13 +120,13 @@ class SensorSubscriptions:
         self._subscribed.clear()
 
     def _forget(self, now: float) -> None:
-        """End subscriptions that were not renewed, or whose permission is over however it ended."""
+        """End subscriptions that were not renewed, or whose permission has ended in any way."""
         for (sensor, subscriber), subscription in list(self._subscribed.items()):
             if subscription.until < now or not self._may_read(subscriber, sensor):
                 del self._subscribed[sensor, subscriber]
 
     def _tick(self) -> bool:
-        """Publish what is due. One timer for all: nobody can fill the clock with wishes."""
+        """Publish values that are due. One timer serves all, so requests cannot fill the clock."""
         now = self._device.clock.now
         self._forget(now)
         for sensor in dict.fromkeys(sensor for sensor, _ in self._subscribed):
@@ -157,13 +156,13 @@ Values = tuple[float, ...]
 Source = Callable[[float], Values]
 StreamsByName = Callable[[str], np.random.Generator]
 
-BLOCK = 64  # samples whose noise is drawn at once
+BLOCK = 64  # number of samples whose noise is drawn at once
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 
 
 class SensorKind(NamedTuple):
-    """A kind of sensor, as it is unless a scenario says otherwise; the numbers are assumed.
+    """Kind of sensor with its default properties; the numbers are assumed.
 
     Attributes:
         unit: Unit of its values.
@@ -194,7 +193,7 @@ KINDS = {
 
 
 class FaultConfig(Config):
-    """One way in which a sensor fails, at a time or by chance.
+    """Fault of a sensor, at a set time or a random one.
 
     Attributes:
         kind: `lost`: no values from then on. `stuck`: the last values for ever.
@@ -220,7 +219,7 @@ class FaultConfig(Config):
 
 
 class SensorConfig(Config):
-    """A sensor that a robot carries; what is left out is as usual for its kind (`KINDS`).
+    """Sensor that a robot carries; by default it has the properties of its kind (`KINDS`).
 
     Attributes:
         name: Name of the kind.
@@ -257,7 +256,7 @@ class SensorConfig(Config):
         return self
 
     def as_kind(self) -> SensorKind:
-        """Return the kind of sensor with what is said here."""
+        """Return the kind of sensor with the properties set here."""
         usual = KINDS[self.name]
         settings = (self.noise, self.resolution, self.low, self.high, self.lag_s)
         pairs = zip(settings, usual[1:], strict=True)
@@ -300,6 +299,7 @@ class RobotSensor:
         """
         if now >= self._lost_at:
             return ()
+        # The margin keeps a read at the very time of a sample from rounding to the one before.
         sample = math.floor(now * self._rate + 1e-6)
         if sample == self._sample or (now >= self._stuck_at and self._shown):
             return self._shown
@@ -316,7 +316,7 @@ class RobotSensor:
         return self._shown
 
     def _follow(self, truth: Floats, now: float) -> Floats:
-        """Return the lag: exact where what is there has been the same since the last sample."""
+        """Return the lagged value; exact if the true value is constant between samples."""
         if self.kind.lag <= 0.0:
             return truth
         if len(self._lagged) != len(truth):
@@ -344,13 +344,13 @@ class Around(Protocol):
 def sources_of(
     world: World, body: RobotBody, around: Around, lidar: Lidar, charge: Callable[[], float]
 ) -> dict[str, Source]:
-    """Return what each kind of sensor measures where the robot is.
+    """Return the true value of each kind of sensor where the robot is.
 
     Args:
         world: The physics.
         body: The robot's own.
-        around: The hazards.
-        lidar: Casts rays; asked only when somebody listens.
+        around: Conditions caused by the hazards.
+        lidar: Lidar, which casts rays only if it has a subscriber.
         charge: Share of the battery's charge that is left.
     """
 
