@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-_TIE_S = 1e-6
+_TIE_S = 1e-6  # commands that arrive within this time before a moment are not seen yet [s]
 
 
 def is_applied(made: ArrayLike) -> NDArray[np.bool_]:

@@ -28,16 +28,16 @@ from dva_sim.network.zmtp import HIGH_WATER_MARK, ZmtpConnection, ZmtpOptions
 
 MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]
 HEADERS = 52  # IPv4 + TCP with time stamps [B]
-MIN_RTO = 0.2
-FIRST_RTO = 1.0
-MAX_RTO = 60.0
-MAX_IN_FLIGHT = 1000  # ZeroMQ's default high-water mark, in messages
+MIN_RTO = 0.2  # minimum of the variance part of the retransmission time-out [s]
+FIRST_RTO = 1.0  # time-out before the first measurement [s]
+MAX_RTO = 60.0  # longest time-out [s]
+MAX_IN_FLIGHT = 1000  # maximum messages under way: ZeroMQ's default high-water mark
 
 Deliver = Callable[[Any], object]
 
 
 def _offer_each(link: Link, now: float, size: int, largest: int, header: int) -> tuple[float, int]:
-    """Send packet by packet [B]: when the last that arrives is there [s], and what is lost [B]."""
+    """Send packet by packet; return the latest arrival [s] and the size that was lost [B]."""
     arrival = 0.0
     missing = 0
     while size > 0:
@@ -117,7 +117,7 @@ class Stream:
             wait = self._recovery_time(tries)
             self._clock.call_at(now + wait, self._transmit, seq, payload, missing, tries + 1)
             return
-        # A remnant sent again may arrive before what had been lost around it: in order only.
+        # Packets sent again may arrive before later ones; a stream delivers in order only.
         last = self._last_arrival = max(self._last_arrival, arrival)
         if tries == 0:
             self._measure(arrival - now + self._backward.delay)
@@ -148,7 +148,7 @@ class Stream:
         self._srtt = srtt + (rtt - srtt) / 8
 
     def _recovery_time(self, tries: int) -> float:
-        """Return when a loss is repaired: by the tail-loss probe, then by doubling time-outs."""
+        """Return the time to repair a loss [s]: by the tail-loss probe, then doubling time-outs."""
         if self._srtt is None:
             return min(MAX_RTO, FIRST_RTO * 2.0**tries)
         rto = self._srtt + max(MIN_RTO, 4 * self._rttvar)
@@ -158,12 +158,12 @@ class Stream:
 
 
 class _PlainEnd:
-    """An end that holds nothing back: what waits, waits before its link."""
+    """End without a buffer of its own: data waits before its link."""
 
     _link: Link
 
     def pause(self) -> None:
-        """Do nothing: what a program cannot take is for it to drop."""
+        """Do nothing: the program has to drop what it cannot take."""
 
     def resume(self) -> None:
         """Do nothing; see `pause`."""
@@ -256,7 +256,7 @@ class Connection:
         self._then()
 
     def _is_accepted(self, _: object) -> None:
-        """Note that the last word of the opener's handshake has reached the peer."""
+        """Note that the end of the opener's handshake has reached the peer."""
         self._to_peer.deliver = self._handlers[0]
         assert self._accepted is not None
         self._accepted()
@@ -308,7 +308,7 @@ class DatagramEnd(_PlainEnd):
 
 
 class DatagramConnection:
-    """Two sockets that know each other: no handshake, and no promise.
+    """Two sockets that exchange datagrams: no handshake, no guarantee of delivery.
 
     Args:
         clock: The run's clock.
@@ -397,8 +397,8 @@ class Load:
     """Greatest load offered to one direction of a link.
 
     Attributes:
-        rate_bps: In the long run, with all headers [bit/s].
-        burst: At once [B].
+        rate_bps: Mean rate in the long run, with all headers [bit/s].
+        burst: Largest burst [B].
     """
 
     rate_bps: float = 0.0
@@ -406,7 +406,7 @@ class Load:
 
 
 class Connector:
-    """Makes the connections of a network.
+    """Factory for the connections of a network.
 
     With depth `auto` a connection is modelled message by message where that is exact, and
     segment by segment where anything might be lost, come out of turn or pile up; see
@@ -414,7 +414,7 @@ class Connector:
 
     Args:
         transport: `zeromq` or `datagrams`.
-        depth: `message`, `segment`, or `auto`; datagrams have but one.
+        depth: `message`, `segment`, or `auto`; datagrams have only one.
         zeromq: Options of the sockets.
         load: Load offered to a link.
         tcp: Further options of TCP at both ends.
@@ -488,10 +488,10 @@ class Connector:
 
 
 def is_calm(link: Link, load: Load) -> bool:
-    """Return True if messages over a link fare as their segments would under TCP.
+    """Return True if whole messages over a link behave like their segments under TCP.
 
-    Nothing may get lost, late by chance or out of turn by itself; the rate must be known and
-    not be used up by more than four fifths; and twice the largest burst must fit into the queue.
+    The link may not lose, delay at random or reorder anything; its rate must be known and used
+    by at most four fifths; and twice the largest burst must fit into the queue.
     """
     if not link.is_ideal() or link.rate_bps is None:
         return False

@@ -1,8 +1,8 @@
 """Requests and publications behind one interface, whatever carries the bytes.
 
-A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
-(publish/subscribe). `dva_sim.network.virtual_network` keeps the promise in virtual time,
-`dva_sim.network.sockets` over ZeroMQ sockets; agents know only what stands here.
+A `Transport` connects nodes by request/reply and publish/subscribe.
+`dva_sim.network.virtual_network` implements it in virtual time, `dva_sim.network.sockets` over
+ZeroMQ sockets; agents use only the interface defined here.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, Protocol
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.makers import maker
 
-QUEUE_LIMIT = 1000  # requests waiting at one requester
-ROUND_TRIPS_KEPT = 100_000
-MAX_ANSWERED = 64  # deadlines of requests that were answered meanwhile
+QUEUE_LIMIT = 1000  # maximum requests waiting at one requester
+ROUND_TRIPS_KEPT = 100_000  # latest round trips that are kept for statistics
+MAX_ANSWERED = 64  # maximum deadlines kept of requests that were answered meanwhile
 
 Answer = Callable[[bytes], object]
 
@@ -72,7 +72,7 @@ OnReply = Callable[[int, bytes], object]
 
 
 class RequestTap(Protocol):
-    """Somebody who looks at what reaches a node; see `dva_sim.network.tap`."""
+    """Observer of what reaches a node; see `dva_sim.network.tap`."""
 
     def serve(self, service: Service, request: Request) -> None:
         """Let the service take the request, and see its answer."""
@@ -109,7 +109,7 @@ class Transport(CommandSockets, Protocol):
     taps: dict[str, RequestTap]
 
     def introduce(self, node: str, address: str) -> None:
-        """Say where a node is found, as in its registration."""
+        """Set the address of a node, as in its registration."""
 
     def forget(self, node: str) -> None:
         """Forget a node to which nobody is connected, or will be."""
@@ -131,7 +131,7 @@ class Transport(CommandSockets, Protocol):
 
 @dataclass(slots=True)
 class _Asked:
-    """A request that waits or is under way."""
+    """Request that waits or is under way."""
 
     tag: int
     data: bytes
@@ -142,15 +142,15 @@ class _Asked:
 
 
 class Requester:
-    """Asks one peer; each request is answered, or fails after a number of attempts.
+    """Requester of one peer; each request is answered, or fails after a number of attempts.
 
     With a window of 1 it is a REQ socket: the next request goes when the last one is
     answered, and after a time-out the connection is closed and reopened. A wider window
-    is a DEALER: so many requests may be under way at once, over one connection.
-    The same bytes are sent again after a time-out, so a receiver can tell a repetition.
+    is a DEALER: several requests may be under way at once, over one connection.
+    The same bytes are sent again after a time-out, so a receiver can recognise a repetition.
 
     Args:
-        transport: Carries the messages.
+        transport: Transport of the messages.
         node: Node that sends the requests.
         peer: Node that replies.
         timeout: Time to wait for a reply [s].
@@ -220,14 +220,14 @@ class Requester:
             self._attempt(request)
 
     def give_up(self) -> None:
-        """Give up a peer that has gone for good: whatever waits has failed."""
+        """Give up a peer that has gone for good; all pending requests fail."""
         waiting = [*self._open.values(), *self._queue]
         self.close()
         for request in waiting:
             request.on_failure()
 
     def close(self) -> None:
-        """Forget everything, without a word to those who wait."""
+        """Forget all requests without calling back."""
         self._queue.clear()
         self._open.clear()
         self._disconnect()
@@ -243,7 +243,7 @@ class Requester:
         """Send a request, over a new connection if there is none."""
         request.attempts += 1
         if len(self._deadlines) > MAX_ANSWERED + 2 * len(self._open):
-            # The first stays, as its event is on its way.
+            # The first stays, since its event is already scheduled.
             first, *later = self._deadlines
             self._deadlines = deque([first, *(each for each in later if each[1] in self._open)])
         self._deadlines.append((self._clock.now + self.timeout, request.tag, request.attempts))
@@ -261,7 +261,7 @@ class Requester:
     def _on_reply(self, tag: int, reply: bytes) -> None:
         request = self._open.pop(tag, None)
         if request is None:
-            return  # doubled, or to a request that was given up
+            return  # a repeated reply, or one to a request that was given up
         self.round_trips.append(self._clock.now - request.sent_at)
         request.on_reply(reply)
         self._fill()
@@ -286,6 +286,7 @@ class Requester:
         self.timeouts += 1
         self.on_timeout()
         if self._window == 1:
+            # A REQ socket cannot send again before it has received: only a new one can.
             self._disconnect()
         if attempt < self._attempts:
             self._attempt(request)

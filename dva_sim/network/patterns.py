@@ -1,8 +1,8 @@
 """Messaging patterns: how the commands of a drive travel from the phone's app to a robot.
 
-A pattern is an object. Its attributes say what everybody else has to know of it: what it is called,
-whether the robot subscribes, which of the commands that wait the robot obeys. Its methods are what
-the app does with each command. Patterns are listed and looked up here.
+A pattern is an object. Its attributes state what others have to know of it: its name, whether the
+robot subscribes, which of the waiting commands the robot obeys. Its methods define what the app
+does with each command. Patterns are listed and looked up here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dva_sim.network.request_window import MAX_UNANSWERED, RequestWindow
 
 
 class Command(Protocol):
-    """A command as the app made it from the tilt; only the line knows how to write it."""
+    """Command as the app made it from the tilt; only the line can encode it."""
 
     @property
     def time(self) -> float:
@@ -68,7 +68,7 @@ class Line(Protocol):
         """Send a command; `then` gets the reply, `failed` is called if none arrives."""
 
     def publish(self, command: Command) -> None:
-        """Publish a command on the robot's topic, to be heard or not."""
+        """Publish a command on the robot's topic, without knowing whether it arrives."""
 
     def newest(self, command: Command) -> Command:
         """Return the phone's present command, if the app keeps sending; else the command itself."""
@@ -80,7 +80,7 @@ class Line(Protocol):
         """Return the code in a reply, see `dva_sim.protocol.messages`; None if unreadable."""
 
     def lost(self, why: str = "") -> None:
-        """Alert, as nobody obeys any more, and end the drive."""
+        """Alert that no robot obeys any more, and end the drive."""
 
 
 class Pattern(ABC):

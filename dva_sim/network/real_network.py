@@ -19,20 +19,20 @@ from dva_sim.network.messaging import (
 )
 from dva_sim.network.realtime import LiveClock
 
-DRAIN: Final = 64  # messages read from one place before others have their turn
-LARGEST: Final = 65_536  # of a request or a reply [B]
-MAX_PICTURE: Final = 2_000_000  # of a publication [B]
+DRAIN: Final = 64  # maximum messages read from one source before others have their turn
+LARGEST: Final = 65_536  # maximum size of a request or a reply [B]
+MAX_PICTURE: Final = 2_000_000  # maximum size of a publication [B]
 
 
 class NetworkError(DvaSimError):
-    """A port that cannot be opened, or a broker that cannot be started."""
+    """Port that cannot be opened, or broker that cannot be started."""
 
 
 class RealNetwork(ABC):
-    """The nodes of this process on a real network; see `Transport`.
+    """Nodes of this process on a real network; see `Transport`.
 
     Args:
-        clock: Waits for what arrives.
+        clock: Clock that waits for arrivals.
         tell: Callback for one line about each connection that could not be made.
 
     Attributes:
@@ -85,7 +85,7 @@ class RealNetwork(ABC):
 
     @abstractmethod
     def leave(self, node: str) -> None:
-        """End what `join` has begun; a request that is still answered goes nowhere."""
+        """End what `join` has begun; later replies of the node are dropped."""
 
     @abstractmethod
     def close(self) -> None:
@@ -114,7 +114,7 @@ class RealNetwork(ABC):
         """Subscribe a node to a topic of a publisher."""
 
     def note(self, node: str, payload: Any, sent: bool = True) -> None:
-        """Note what is said here, for somebody who may want to know."""
+        """Pass a message to the watcher, if there is one."""
         if self.watcher is not None:
             self.watcher(node, payload, sent)
 

@@ -17,9 +17,9 @@ from typing_extensions import override
 
 from dva_sim.kernel.clock import US, Clock
 
-HEEDED_SLEEP: Final = 1.0  # of a machine that was suspended [s]
-LATE_EVENTS_PER_TURN = 500  # events that are late, before messages have their turn
-MAX_WAIT = 60.0  # of one poll [s]
+HEEDED_SLEEP: Final = 1.0  # shortest suspension of the machine that is reported [s]
+LATE_EVENTS_PER_TURN = 500  # maximum late events before messages have their turn
+MAX_WAIT = 60.0  # longest wait of one poll [s]
 
 POLLIN: Final = int(zmq.POLLIN)  # pyzmq's enumerations cost more than a system call
 
@@ -57,7 +57,7 @@ class Poller:
         self._ask: dict[Socket, None] = {}
 
     def register(self, source: Any) -> None:
-        """Wait for a socket of ZeroMQ, or for a file descriptor, too."""
+        """Begin to wait for a socket of ZeroMQ, or for a file descriptor."""
         file = source
         if isinstance(source, zmq.Socket):
             file = int(source.getsockopt(zmq.FD))
@@ -73,7 +73,7 @@ class Poller:
         self._ask.pop(source, None)
 
     def look(self, source: Any) -> None:
-        """Ask a socket again, if it is one of these: it was used by others."""
+        """Ask a registered socket again, since it was used by others."""
         if source in self._sockets:
             self._ask[source] = None
 
@@ -85,11 +85,11 @@ class Poller:
         return more
 
     def read_out(self, source: Socket) -> None:
-        """Note that a socket has no more to read until its file says so."""
+        """Note that a socket has nothing to read until its file signals."""
         self._ask.pop(source, None)
 
     def poll(self, wait: float) -> list[Any]:
-        """Return those that have something to read, after so long at most [s]; possibly none."""
+        """Return the sources that have something to read, after at most `wait` [s]; maybe none."""
         ready = {socket: None for socket in self._ask if has_more(socket)} if self._ask else {}
         waiting: list[Any] = []
         for key, _ in self._selector.select(0.0 if ready else wait):
@@ -102,7 +102,7 @@ class Poller:
         return [*ready, *waiting]
 
     def close(self) -> None:
-        """Wait for nothing more."""
+        """Release the system's resources."""
         self._selector.close()
 
 
@@ -142,7 +142,7 @@ class LiveClock(Clock):
         self._on_suspended.append(handler)
 
     def _look_for_sleep(self) -> None:
-        """Tell of a sleep before anything is read that came, or waited, meanwhile.
+        """Report a suspension before anything is read that arrived or waited meanwhile.
 
         This clock stood still like all others, so that what is old would count as new.
         """
@@ -174,7 +174,7 @@ class LiveClock(Clock):
         self._running = False
 
     def run(self, until: float = math.inf) -> None:
-        """Live until a time [s], or until `stop` is called; messages are read even when behind."""
+        """Run until a time [s], or until `stop` is called; messages are read even when behind."""
         self._running = True
         end = math.inf if math.isinf(until) else round(until * US)
         self._catch_up(end)
@@ -200,7 +200,7 @@ class LiveClock(Clock):
             self._catch_up(end)
 
     def _catch_up(self, end: float) -> None:
-        """Let the events happen that are due, in their order, then make it now."""
+        """Process the events that are due, in order, then advance to the current time."""
         env = self.env
         real = self._real()
         until = real if real < end else end
@@ -255,9 +255,9 @@ class ProgramClock(LiveClock):
                 handler()
 
 
-MAX_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
-HEEDED = 0.02  # what is less late is in time [s]
-FASTEST = 20.0  # that a paced clock goes, as a multiple of real time
+MAX_BEHIND = 1.0  # longest lag that a paced clock makes up for; more is given up [s]
+HEEDED = 0.02  # an event less late than this is in time [s]
+FASTEST = 20.0  # maximum speed of a paced clock, as a multiple of real time
 
 
 class PacedClock(LiveClock):
@@ -296,18 +296,18 @@ class PacedClock(LiveClock):
         return self._halted
 
     def pace(self, factor: float | None = None, paused: bool | None = None) -> None:
-        """Go faster or slower from now on, halt, or go on."""
+        """Change the speed from now on, halt, or resume."""
         self._rebase(self._real())
         self._factor = self._factor if factor is None else factor
         self._halted = self._halted if paused is None else paused
 
     def go(self) -> None:
-        """Let virtual time go on from where it is, whatever real time has passed."""
+        """Resume virtual time from where it is, whatever real time has passed."""
         self._rebase(int(self._now_us))
         self._worst = 0.0
 
     def worst_lag(self) -> float:
-        """Return how late an event has come at most since the last time of asking [s]."""
+        """Return the greatest lateness of an event since the last call [s]."""
         worst = self._worst
         self._worst = 0.0
         return worst
@@ -373,7 +373,7 @@ class PacedClock(LiveClock):
 
 
 class _Pulse:
-    """Something to be done again and again by the wall clock."""
+    """Action repeated by the wall clock."""
 
     def __init__(self, period: float, action: Callable[[], object]) -> None:
         self._period = period

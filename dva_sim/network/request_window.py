@@ -15,15 +15,15 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-MAX_UNANSWERED = 64  # unanswered requests; a second each way needs 20 at ten commands a second
-_FIRST = 4
-_QUEUE = 0.5  # requests; more than that in a queue is a queue
-_ROUND_TRIP_S = 30.0  # the least one of so long: a path may become longer
-_RATE_S = 10.0  # the greatest one of so long; then one request more is tried
+MAX_UNANSWERED = 64  # maximum window; a second each way needs 20 at ten commands a second
+_FIRST = 4  # initial window [requests]
+_QUEUE = 0.5  # backlog above which a queue counts as seen [requests]
+_ROUND_TRIP_S = 30.0  # time over which the least round trip counts: paths may become longer [s]
+_RATE_S = 10.0  # time over which the greatest rate counts; then one request more is tried [s]
 
 
 class _Round(NamedTuple):
-    """One round: when it ended [s], its least round trip [s], its rate of answers [Hz]."""
+    """Round of requests: its end [s], least round trip [s], and rate of answers [Hz]."""
 
     end: float
     least: float
@@ -31,7 +31,7 @@ class _Round(NamedTuple):
 
 
 class RequestWindow:
-    """Keep as many requests unanswered as make the command in force youngest.
+    """Window of unanswered requests for the youngest command in force.
 
     Until a queue is seen the window grows, twofold each round trip at first, while commands wait
     for it. Once one is seen, it is what the two estimates say, until they are too old.
@@ -65,7 +65,7 @@ class RequestWindow:
         return False
 
     def sent(self) -> int:
-        """Count a request that is sent; its number."""
+        """Count a request that is sent; return its number."""
         self.unanswered += 1
         self._sent += 1
         return self._sent

@@ -31,12 +31,12 @@ from dva_sim.network.realtime import Poller
 
 _SIGNATURE = b"\xff" + bytes(7) + b"\x01\x7f"
 _VERSION = b"\x03\x00"
-_MECHANISM = slice(12, 32)  # where it stands in a greeting, filled up with zeros
-_LENGTH = 64
+_MECHANISM = slice(12, 32)  # position of the mechanism in a greeting, padded with zeros
+_LENGTH = 64  # size of a whole greeting [B]
 
 
 class Greeting:
-    """A greeting under way.
+    """Greeting under way.
 
     Args:
         context: Context of its socket.
@@ -63,7 +63,7 @@ class Greeting:
         self.socket.connect(endpoint)
 
     def read(self) -> None:
-        """Take what has arrived, and go on."""
+        """Take what has arrived, and answer it."""
         while not self.done:
             try:
                 peer, data = self.socket.recv_multipart(zmq.NOBLOCK)
@@ -71,7 +71,7 @@ class Greeting:
                 return
             if data:
                 self._hear(peer, data)
-            elif self._is_open:  # an empty message tells of an end, too
+            elif self._is_open:  # an empty message reports the opening, and later the end
                 self.done = True
             else:
                 self._is_open = True
@@ -97,11 +97,11 @@ class Greeting:
             self.done = True
 
 
-HANDSHAKE_LIMIT = 10_000  # for the other end to answer, whose loop may be busy [ms]
+HANDSHAKE_LIMIT = 10_000  # time for the other end to answer, whose loop may be busy [ms]
 
 
 class Reason(StrEnum):
-    """Reason why two ends did not connect; the same word at both, as far as an end can know."""
+    """Reason why two ends did not connect; the same at both, as far as each can know it."""
 
     UNKNOWN_KEY = "unknown key"
     WRONG_SERVER_KEY = "wrong server key"
@@ -114,11 +114,11 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True)
 class Refusal:
-    """Two ends that did not come together, as seen from one.
+    """Failed connection of two ends, as seen from one.
 
     Attributes:
         device: Device that noticed the failure.
-        peer: The device it wanted to reach; None at a server, which cannot know.
+        peer: The device it wanted to reach; None at a server, which cannot know it.
         endpoint: Address of the server; empty if unknown.
         reason: Reason code.
         why: Reason in words.
@@ -177,21 +177,21 @@ def at_client(has_keys: bool, device: str, peer: str, event: int, code: int) -> 
 
 
 def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
-    """Return True if one end has keys and the other has none."""
+    """Interpret a handshake in which only one end has keys."""
     if not has_keys:
         return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
     return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
 
 
-# Pause before connecting again, up to twice as long by chance. It doubles while nobody listens,
-# but not while somebody listens and hangs up, so the first one is what limits that storm.
-RECONNECT_FIRST = 250  # [ms]
-RECONNECT_MAX = 4_000  # [ms]
-MAX_HANGUPS = 3  # interrupted handshakes of a peer before they are reported
-UNKNOWN_KEYS_REPORTED = 100  # unknown keys that are told one by one; there can be any number
-EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
+# Pause before connecting again; ZeroMQ adds up to as much at random. It doubles while nobody
+# listens, but not while a peer listens and hangs up, so the first pause limits such a storm.
+RECONNECT_FIRST = 250  # first pause [ms]
+RECONNECT_MAX = 4_000  # longest pause [ms]
+MAX_HANGUPS = 3  # interrupted handshakes of a peer before they are looked into
+UNKNOWN_KEYS_REPORTED = 100  # maximum unknown keys reported one by one; there may be any number
+EVENTS_AT_ONCE = 1_000  # maximum events read from a monitor before the loop has its turn again
 
-# A monitor that nobody reads stops all traffic of its context when it is full.
+# Maximum events waiting in a monitor: a full one that nobody reads stops its whole context.
 _MONITOR_ROOM = 100_000
 _ZAP = "inproc://zeromq.zap.01"
 _FAILED = (
@@ -208,7 +208,7 @@ _Way = tuple[str, str, str]  # from which device to which, at which endpoint
 
 @dataclass
 class _Handshake:
-    """History of a device with one endpoint since they were last connected."""
+    """Failures of a device at one endpoint since they were last connected."""
 
     hang_ups: int = 0
     latest: Refusal | None = None
@@ -218,7 +218,7 @@ class _Handshake:
 
 @dataclass(frozen=True)
 class _Watch:
-    """A watched socket; without a peer, it is one that binds."""
+    """Watched socket; without a peer, one that binds."""
 
     socket: Socket
     device: str
@@ -226,14 +226,14 @@ class _Watch:
 
 
 class Security:
-    """The keys of all sockets in one context, and what goes wrong with them.
+    """Keys of all sockets in one context, and reports of failed handshakes.
 
     Args:
         context: Context of the sockets; it can have one `Security` with keys.
-        poller: The loop's; monitors come and go in it with the sockets that they watch.
+        poller: Poller of the loop; monitors come and go in it with the sockets that they watch.
         ring: The keys; None to run without.
-        tell: Called with what there is to say: once for each cause until both ends have come
-            together, so it cannot become a flood.
+        tell: Callback for each refusal, once for each cause until both ends have connected, so
+            that it cannot become a flood.
 
     Attributes:
         refused: Failed handshakes of each device by reason, reported or not.
@@ -261,7 +261,7 @@ class Security:
         self._zap = None if ring is None else self._open_zap()
 
     def bind_server(self, socket: Socket, device: str) -> None:
-        """Make `socket`, before it binds, one that serves with the key of `device`.
+        """Prepare `socket`, before it binds, to serve with the key of `device`.
 
         Raises:
             ConfigError: the pair of keys of `device` is not at hand.
@@ -275,9 +275,9 @@ class Security:
         self._watch(socket, device, None)
 
     def connect_client(self, socket: Socket, device: str, peer: str) -> None:
-        """Make `socket`, before it connects, one of `device` that reaches nobody but `peer`.
+        """Prepare `socket` of `device`, before it connects, to reach nobody but `peer`.
 
-        It is for one peer only: what arrives on it carries no name, but can be from nobody else.
+        Messages that arrive on it carry no name, but can come only from that peer.
 
         Raises:
             ConfigError: the pair of `device` or the public key of `peer` is not at hand.
@@ -295,7 +295,7 @@ class Security:
         return [*self._watches, *self._greetings, *zap]
 
     def handle(self, ready: object) -> bool:
-        """Take what has arrived if `ready` is one of these sockets; whether it was."""
+        """Take what has arrived if `ready` is one of these sockets; return True if it is."""
         if ready is self._zap and self._zap is not None:
             self._read(self._zap, self._answer)
         elif isinstance(ready, zmq.Socket) and ready in self._watches:
@@ -318,7 +318,7 @@ class Security:
         return None if self._ring is None else self._ring.owner(key.encode())
 
     def aim(self, socket: Socket, device: str, peer: str) -> None:
-        """Give `socket` the key that its peer has by now, for connections from now on.
+        """Give `socket` its peer's current key, for connections from now on.
 
         Raises:
             ConfigError: the public key of `peer` is not at hand.
@@ -344,7 +344,7 @@ class Security:
             self._end_greeting(socket)
 
     def release(self, socket: Socket) -> None:
-        """Watch a socket no longer; to be called before it is closed."""
+        """Stop watching a socket; to be called before it is closed."""
         monitor = self._monitors.get(socket)
         if monitor is not None:
             self._drop(monitor)
@@ -361,7 +361,7 @@ class Security:
             self._zap = None
 
     def _open_zap(self) -> Socket:
-        """Return the socket that libzmq asks, by its name, whether a key is good."""
+        """Return the socket at which libzmq asks, by its fixed name, whether a key is accepted."""
         zap = self._context.socket(zmq.REP)
         zap.setsockopt(zmq.LINGER, 0)
         try:
@@ -391,7 +391,7 @@ class Security:
         self._monitors[socket] = monitor
 
     def _drop(self, monitor: Socket) -> None:
-        """End a monitor, its source first: libzmq would wait for a reader that has gone."""
+        """End a monitor, its source first: otherwise libzmq waits for a reader that has gone."""
         watch = self._watches.pop(monitor)
         del self._monitors[watch.socket]
         if not watch.socket.closed:
@@ -410,13 +410,13 @@ class Security:
             take(frames)
 
     def _answer(self, frames: list[bytes]) -> None:
-        """Say whether a key is good, and whose it is (ZeroMQ RFC 27)."""
+        """Answer whether a key is accepted (ZeroMQ RFC 27)."""
         version, request, domain, address, _, mechanism, *credentials = frames
         device = domain.decode()
         key = b"".join(credentials)
         curve = mechanism == b"CURVE" and len(key) == 32
         owner = self._ring.owner(key) if curve and self._ring is not None else None
-        # Whose key it is counts at each message: until then it may have been taken away.
+        # The user id is the key: its owner is looked up for each message, as keys may be removed.
         status = [b"400", b"unknown key", b""] if owner is None else [b"200", b"", z85.encode(key)]
         assert self._zap is not None
         self._zap.send_multipart([version, request, *status, b""])
@@ -499,7 +499,7 @@ class Security:
         if greeting.done:
             self._end_greeting(socket)
         handshake = self._handshakes.get(connection[1], {}).get(connection)
-        # The news of the end may fail to come: what the other end speaks is enough to conclude.
+        # The end may never be reported: the other end's mechanism is enough to conclude.
         is_open = greeting.theirs is None and not greeting.done
         if is_open or handshake is None or handshake.reported:
             return

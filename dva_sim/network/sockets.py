@@ -1,4 +1,4 @@
-"""Asking and telling over ZeroMQ sockets, in real time.
+"""Requests and publications over ZeroMQ sockets, in real time.
 
 Each node has two sockets: a ROUTER for the requests to it, on the port that it registers with, and
 an XPUB for what it publishes, on the next one; peers use REQ, DEALER, SUB (`protocol/README.md`).
@@ -44,7 +44,7 @@ from dva_sim.network.socket_io import (
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
-    """Return the socket options by number; what the kernel is to choose is left out."""
+    """Return the socket options by number, without those that the kernel chooses."""
     options = {
         zmq.SNDHWM: zeromq.high_water_mark,
         zmq.RCVHWM: zeromq.high_water_mark,
@@ -55,7 +55,7 @@ def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
 
 
 class SocketWire:
-    """One connection to the service of a peer, as far as REQ and DEALER agree."""
+    """Connection to the service of a peer: what REQ and DEALER have in common."""
 
     kind: int
 
@@ -105,11 +105,11 @@ class ReqWire(SocketWire):
         # A REQ socket: the previous request must have been answered.
         self._tag = tag
         self._network.note(self._node, data)
-        # It throws away what it still has to read before it sends: its file tells what comes.
+        # Sending discards unread replies, so the socket need not be looked at: its file signals.
         self._network.send(self._socket, [data], look=False)
 
     def _replies(self) -> None:
-        """Read the one reply there is at most: asking for more would delay every command."""
+        """Read the one reply that there can be: looking for more would delay every command."""
         frames = receive(self._socket)
         self._network.clock.read_out(self._socket)
         if frames is not None:
@@ -184,18 +184,18 @@ class SocketSubscription:
                 self._network.counters["publications of another form"] += 1
 
 
-DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
-MAX_TOPIC: Final = 512  # ZeroMQ drops a subscriber who sends longer messages [B]
-LINGER: Final = 200  # for last words when a node leaves [ms]
-LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
-CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
-GIVE_BACK: Final = 10.0  # between looks whether memory is worth giving back, which takes 5 ms [s]
-WORTH_IT: Final = 50  # sockets closed since
-READ_KEYS: Final = 1.0  # between looks whether keys have come or gone [s]
-BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s]
-RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
-PORT_TRIES: Final = 50
-SOCKET_LIMIT: Final = 60_000
+DEFAULT_PORT: Final = 5600  # port of requests; publications use the next one
+MAX_TOPIC: Final = 512  # longest message of a subscriber: ZeroMQ drops one that sends more [B]
+LINGER: Final = 200  # time for pending messages when a node leaves [ms]
+LOOK_ASIDE: Final = 0.05  # interval of looks at handshakes [s]
+CLOSED_AT_ONCE: Final = 10  # maximum sockets that are closed at each such look
+GIVE_BACK: Final = 10.0  # interval of checks whether to give memory back, which takes 5 ms [s]
+WORTH_IT: Final = 50  # closed sockets that make giving memory back worthwhile
+READ_KEYS: Final = 1.0  # interval of looks for new and removed keys [s]
+BIND_AGAIN: Final = 0.05  # interval of attempts while a port is still in use [s]
+RETRY: Final = 5.0  # delay of a new attempt after ZeroMQ gave up connecting [s]
+PORT_TRIES: Final = 50  # attempts to find two free ports in a row
+SOCKET_LIMIT: Final = 60_000  # maximum sockets of the context
 # A peer that loses its power disappears without closing its connections. Without these options a
 # subscriber would wait for ever and a request for its time-out, and a listener would keep dead
 # connections.
@@ -204,8 +204,8 @@ CLIENT: Final[Mapping[int, int]] = {
     zmq.TCP_KEEPALIVE_IDLE: 2,  # silence before the kernel probes the peer [s]
     zmq.TCP_KEEPALIVE_INTVL: 2,  # between probes [s]
     zmq.TCP_KEEPALIVE_CNT: 15,  # unanswered probes that end a connection
-    zmq.TCP_MAXRT: 30_000,  # how long sent bytes may stay unacknowledged [ms]
-    zmq.CONNECT_TIMEOUT: 10_000,  # before a new attempt: the kernel's own pauses double [ms]
+    zmq.TCP_MAXRT: 30_000,  # maximum time for which sent bytes stay unacknowledged [ms]
+    zmq.CONNECT_TIMEOUT: 10_000,  # until a new attempt, since the kernel's own pauses double [ms]
 }
 # More patient: a phone that sleeps and only listens would never reconnect.
 LISTENER: Final[Mapping[int, int]] = {
@@ -219,21 +219,21 @@ LISTENER: Final[Mapping[int, int]] = {
 def give_back_memory() -> None:
     """Return memory that closed sockets have freed to the system, where the C library can.
 
-    A connection takes 110 kB in pieces, between which something of others comes to lie: by itself
-    the library keeps almost all of it, and with each wave of devices more pages of it are touched.
+    A connection takes 110 kB in pieces, with memory of others in between: by itself the library
+    keeps almost all of it, and with each wave of devices it touches more pages.
     """
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def split_address(address: str) -> tuple[str, int]:
-    """Host and port of an address by the schema, such as `192.168.1.48:5600`, or without port."""
+    """Return host and port of an address such as `192.168.1.48:5600`; the port is optional."""
     host, _, port = address.partition(":")
     return host, int(port) if port else DEFAULT_PORT
 
 
 class NodeCrossing(Protocol):
-    """Leads connections of nodes across a link."""
+    """Route of connections between nodes across a link."""
 
     def place(self, port: int) -> str:
         """Return a further endpoint of a node that listens at a port."""
@@ -243,16 +243,16 @@ class NodeCrossing(Protocol):
 
 
 class SocketNetwork(RealNetwork):
-    """The nodes of this process, each with sockets of its own.
+    """Network of the nodes of this process, each with sockets of its own.
 
     Args:
-        clock: Waits for the sockets.
+        clock: Clock that waits for the sockets.
         ring: Keys of the devices; None to run without.
         tell: Callback for one line about each connection that could not be made.
-        zeromq: Set on every socket; `conflate` cannot be, since messages here have several
-            parts, of which ZeroMQ would keep the last alone.
-        crossing: Leads connections between nodes of this process that are at different ends of a
-            link; None: all connect directly.
+        zeromq: Options of every socket but `conflate`: messages here have several parts, of
+            which ZeroMQ would keep only the last.
+        crossing: Route between nodes of this process at different ends of a link; None: all
+            connect directly.
     """
 
     def __init__(
@@ -270,7 +270,7 @@ class SocketNetwork(RealNetwork):
         # Each connection needs three; the system's own limit of open files comes first.
         self._context.set(zmq.MAX_SOCKETS, SOCKET_LIMIT)
         self._ring = ring
-        self._aside = Poller()  # what can wait is looked at now and then
+        self._aside = Poller()  # sockets that can wait, polled now and then
         self._security = Security(self._context, self._aside, ring, self._refused)
         clock.every(LOOK_ASIDE, self._look_aside)
         clock.every(GIVE_BACK, self._give_back)
@@ -279,11 +279,11 @@ class SocketNetwork(RealNetwork):
         self._routers: dict[str, Socket] = {}
         self._unread: set[Socket] = set()  # routers in the middle of a request that is dropped
         self._publishers: dict[str, PublisherSocket] = {}
-        self._clients: dict[str, dict[Socket, str]] = {}  # by peer: whose
+        self._clients: dict[str, dict[Socket, str]] = {}  # owner of each socket, by peer
         self._leaving: deque[Socket] = deque()
         self._closed = 0
 
-    # --- who is where ------------------------------------------------------------------
+    # --- nodes and their addresses -----------------------------------------------------
 
     @override
     def introduce(self, node: str, address: str) -> None:
@@ -395,7 +395,7 @@ class SocketNetwork(RealNetwork):
             if last.more:
                 self.counters["requests of another form"] += 1
                 self._unread.add(router)
-                return  # others have their turn before its many other parts
+                return  # others have their turn before its many further parts
             sender = None if self._ring is None else self._security.sender(last)
             if sender is not None or self._ring is None:
                 origin = f"{last.get('Peer-Address')} {sender or ''}"
@@ -440,7 +440,7 @@ class SocketNetwork(RealNetwork):
         )
 
     def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:
-        """Send without waiting, or drop and count it; `look` unless the file tells all to read."""
+        """Send without waiting, or drop and count it; `look` unless the file signals anyway."""
         try:
             for frame in frames[:-1]:
                 send(socket, frame, MORE)
@@ -463,7 +463,7 @@ class SocketNetwork(RealNetwork):
 
     @override
     def ready(self, node: str, topic: str, size: int) -> bool:
-        publisher = self._publishers.get(node)  # what waits in the kernel cannot be seen from here
+        publisher = self._publishers.get(node)  # a backlog in the kernel cannot be seen from here
         return publisher is not None and publisher.wanted(topic)
 
     @override
@@ -501,17 +501,17 @@ class SocketNetwork(RealNetwork):
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)
         else:
-            # Messages say which peers there are: an unknown one must not end this program.
+            # Peers come from messages: an unknown one must not end this program.
             self._tell_once(f"no public key of {peer}: nothing is sent to it")
         self._reach(socket, peer)
         return socket
 
     def _has_key(self, peer: str) -> bool:
-        """Return True if a peer can be told from an impostor, or need not be."""
+        """Return True if a peer's key is known, or the network runs without keys."""
         return self._ring is None or peer in self._ring.devices
 
     def _reach(self, socket: Socket, peer: str) -> None:
-        """Connect to where a peer is now, and to nowhere else, if there is a way to it."""
+        """Connect to the present address of a peer, and to no other, if there is one."""
         published = socket.getsockopt(zmq.TYPE) == zmq.SUB
         endpoint = self.endpoint(peer, published)
         if endpoint is None or not self._has_key(peer):
@@ -524,7 +524,7 @@ class SocketNetwork(RealNetwork):
         self.clock.look(socket)
 
     def _read_keys(self, ring: KeyRing) -> bool:
-        """Heed the keys that have come and gone: connections made with others end."""
+        """Apply new, changed and removed keys: connections made with former keys end."""
         if self._context.closed:
             return False
         before = set(ring.devices)
@@ -552,7 +552,7 @@ class SocketNetwork(RealNetwork):
         self._bind_again(node, endpoint)
 
     def _bind_again(self, node: str, endpoint: str) -> None:
-        """Listen where the last socket has listened, as soon as that has gone."""
+        """Listen where the previous socket did, as soon as that port is free."""
         try:
             self._publishers[node].socket.bind(endpoint)
         except zmq.ZMQError:
@@ -563,9 +563,10 @@ class SocketNetwork(RealNetwork):
         """Close a socket made by `client`.
 
         Args:
-            socket: Nothing more is read from it.
+            socket: Socket, from which nothing more is read.
             peer: Peer that it connects to.
-            soon: A few at a time: when many devices vanish together, the others are not to wait.
+            soon: True to close it later, a few at a time: when many devices vanish together,
+                others must not wait.
         """
         sockets = self._clients.get(peer, {})
         if sockets.pop(socket, None) is not None:
@@ -588,7 +589,7 @@ class SocketNetwork(RealNetwork):
             self._close(socket)
 
     def _refused(self, refusal: Refusal) -> None:
-        """Say that a connection was refused, and try again where ZeroMQ does not."""
+        """Report a refused connection, and retry where ZeroMQ does not."""
         self._tell(str(refusal))
         if refusal.gave_up and refusal.peer is not None:
             self.clock.call_after(RETRY, self._retry, refusal.device, refusal.peer)

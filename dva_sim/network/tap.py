@@ -26,10 +26,10 @@ from dva_sim.network.messaging import Request, Service
 
 @dataclass(slots=True)
 class Exchange:
-    """A request that has arrived and its reply, or a publication that was heard.
+    """Request that has arrived with its reply, or publication that was heard.
 
     Attributes:
-        number: In the order of arrival, from 1.
+        number: Number in the order of arrival, from 1.
         arrived: Arrival time by the run's clock [s].
         data: Content of the message.
         peer: Identity of the connection; for a publication, the id of its publisher.
@@ -50,7 +50,7 @@ class Exchange:
 
 
 class Tap:
-    """Sees what one node is asked, what it answers, and which publications it hears.
+    """Observer of the requests to one node, its replies, and the publications that it hears.
 
     Args:
         clock: The run's clock.

@@ -15,16 +15,16 @@ from dva_sim.network.link import Link
 from dva_sim.network.messaging import OnReply, Request, RequestTap, Service
 from dva_sim.network.zmtp import ZmtpConnection
 
-FRAMING = 9  # ZMTP header of a frame above 255 bytes; the few shorter messages count the same [B]
-RECONNECT = 0.1  # after a connection broke; ZeroMQ's default [s]
-SUBSCRIBE_AGAIN = 1.0  # where a subscription may get lost; assumed [s]
+FRAMING = 9  # ZMTP header of a frame above 255 bytes, counted for shorter ones too [B]
+RECONNECT = 0.1  # delay of a reconnection; ZeroMQ's default [s]
+SUBSCRIBE_AGAIN = 1.0  # interval of subscriptions where one may get lost; assumed [s]
 
 Links = Callable[[str, str], tuple[Link, Link]]
 Traffic = Callable[[float, str, str, int, Any], None]
 Delivered = Callable[[float, str, str, Any], None]
 Take = Callable[[Any], None]
 Interference = Callable[[str, str, Any, Take], None]
-"""Takes a payload that reaches a node, from whom, to whom, and what takes it there."""
+"""Callback for a payload that reaches a node: sender, receiver, payload, and its consumer."""
 
 
 class VirtualNetwork:
@@ -41,7 +41,7 @@ class VirtualNetwork:
         dropped: Publications that found the pipe of a subscriber full.
         taps: See `Transport`.
         interference: Filter that may drop, delay or replace each payload; None: no interference.
-        on_open: Callback for each connection that stands: who has opened it, and to whom.
+        on_open: Callback for each connection that is open now: its node, and the peer.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class VirtualNetwork:
         self._wanted: dict[tuple[str, str], list[VirtualSubscription]] = {}
 
     def introduce(self, node: str, address: str) -> None:
-        """See `Transport`: here everybody is found by name."""
+        """Do nothing: nodes are found here by their ids; see `Transport`."""
 
     def forget(self, node: str) -> None:
         """Forget a node."""
@@ -77,7 +77,7 @@ class VirtualNetwork:
         self._services[node] = service
 
     def service(self, node: str) -> Service | None:
-        """Return what takes the requests to a node, if it is there."""
+        """Return the service of a node, if the node is present."""
         return None if node in self._gone else self._services.get(node)
 
     def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> VirtualWire:
@@ -122,21 +122,21 @@ class VirtualNetwork:
                 self.clock.call_after(RECONNECT, client.reopen)
 
     def remember(self, client: VirtualClient) -> None:
-        """Remember that somebody wants something of a node."""
+        """Register a client of a node."""
         self._clients[client.peer][client] = None
         self._wanted.clear()
 
     def release(self, client: VirtualClient) -> None:
-        """Release a node of which somebody wants nothing more."""
+        """Unregister a client of a node."""
         self._clients[client.peer].pop(client, None)
         self._wanted.clear()
 
     def is_wanted(self, client: VirtualClient) -> bool:
-        """Return True if a node is present and still of interest to somebody."""
+        """Return True if the peer is present and the client still registered."""
         return client.peer not in self._gone and client in self._clients[client.peer]
 
     def _subscribers(self, node: str, topic: str) -> list[VirtualSubscription]:
-        """Return the subscribers of a topic, connected or not; computed again after any change."""
+        """Return the subscribers of a topic, connected or not; cached until one comes or goes."""
         subscribers = self._wanted.get((node, topic))
         if subscribers is None:
             subscribers = [
@@ -170,7 +170,7 @@ class VirtualClient:
         self._is_up = False
 
     def reopen(self) -> None:
-        """Reconnect, unless that has been done or nobody needs it any more."""
+        """Reconnect, unless that has been done or the client is closed."""
         if not self._is_up:
             self.connection = self._new_connection()
             self._open()
@@ -181,7 +181,7 @@ class VirtualClient:
         self._network.release(self)
 
     def _while_connected(self, take: Take) -> Take:
-        """Return what takes a payload later, unless the connection it came by is gone by then."""
+        """Return a consumer that ignores payloads once the connection they came by is gone."""
         connection = self.connection
 
         def taken(payload: Any) -> None:
@@ -233,7 +233,7 @@ class VirtualWire(VirtualClient):
         self._go_on()
 
     def _go_on(self) -> None:
-        """Send what waits, as far as there is room."""
+        """Send waiting requests, as far as there is room."""
         while self._is_open and self._waiting:
             tag, data = self._waiting[0]
             size = len(data) + FRAMING
@@ -243,7 +243,7 @@ class VirtualWire(VirtualClient):
             self._network.traffic(self._network.clock.now, self.node, self.peer, size, data)
 
     def _new_connection(self) -> AnyConnection:
-        """Return a reply over the connection that its request came by, or nowhere."""
+        """Return a connection; replies go back over the one that their request came by."""
         network = self._network
 
         def at_peer(payload: tuple[int, bytes]) -> None:
@@ -294,10 +294,11 @@ class VirtualWire(VirtualClient):
 
 
 class VirtualSubscription(VirtualClient):
-    """A SUB socket: opens a connection to the publisher and says what it wants.
+    """SUB socket: opens a connection to the publisher and sends its topic.
 
     Attributes:
-        send: Sends a publication of a size [B] to it; None until the publisher knows of it.
+        send: Function that sends it a publication of a size [B]; None until the publisher knows
+            of the subscription.
     """
 
     def __init__(
@@ -310,7 +311,7 @@ class VirtualSubscription(VirtualClient):
     ) -> None:
         self.topic = topic
         self._handler = handler
-        self._newest: Any = None  # of those that came in one piece, if only that is kept
+        self._newest: Any = None  # latest payload of a batch, if only that is kept
         self._hand_on = self._keep if network.connector.conflates_receiver else handler
         self.send: Callable[[Any, int], bool] | None = None
         super().__init__(network, node, publisher)
@@ -329,7 +330,7 @@ class VirtualSubscription(VirtualClient):
         self.send = None
 
     def _opened(self) -> None:
-        """Subscribe; again and again where that may get lost."""
+        """Subscribe; repeat that at intervals where it may get lost."""
         self._network.on_open(self.node, self.peer)
         connection = self.connection
         if connection.opener.send(self.topic, len(self.topic) + 1) and not connection.keeps:

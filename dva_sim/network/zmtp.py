@@ -1,7 +1,7 @@
 """A ZeroMQ connection over TCP: greeting, framing, pipes, encoder and decoder.
 
-A pipe is a queue with a high-water mark. Who writes learns of what was read only in steps of the
-low-water mark, half of the high one: so a full pipe stays full until half of it has been read.
+A pipe is a queue with a high-water mark. A writer learns of reads only in steps of the low-water
+mark, half of the high one: so a full pipe stays full until half of it has been read.
 
 A message waits in the pipe until the encoder takes it into a batch, the batch until TCP's send
 buffer has room, and its bytes until TCP may send them: in order, all of it. At the other end
@@ -95,18 +95,18 @@ class Flow(Protocol):
     """Source of messages that can be paused."""
 
     def pause(self) -> None:
-        """Deliver nothing more: what comes waits, at last at the sender."""
+        """Deliver nothing more: messages wait on the way, and in the end at the sender."""
 
     def resume(self) -> None:
-        """Go on with what has waited."""
+        """Continue with the waiting messages."""
 
 
-BATCH = 8192  # bytes that the encoder hands over, and the decoder reads, at once
-SIGNATURE = 10  # the beginning of a greeting [B]
-GREETING = 64  # all of it [B]
-READY = 43  # the READY command of a DEALER or ROUTER; the shortest has 27 [B]
+BATCH = 8192  # size that the encoder hands over, and the decoder reads, at once [B]
+SIGNATURE = 10  # size of the beginning of a greeting [B]
+GREETING = 64  # size of a whole greeting [B]
+READY = 43  # size of the READY command of a DEALER or ROUTER; the shortest has 27 [B]
 
-# How much of the other end's greeting must be heard before what is said next; at last nothing.
+# Bytes of the other end's greeting that must have arrived, and bytes that are sent then.
 _GREETING = (
     (SIGNATURE, 1),  # the major version
     (SIGNATURE + 1, GREETING - SIGNATURE - 1),
@@ -211,7 +211,7 @@ class ZmtpEnd:
     # --- the handshake -------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Begin on TCP: say the signature, the rest as the other end is heard."""
+        """Begin on TCP: send the signature, and the rest as the other end's greeting arrives."""
         self._say(SIGNATURE)
         self._read()
 
@@ -241,7 +241,7 @@ class ZmtpEnd:
                 return
 
     def _fill(self) -> None:
-        """Take messages into a batch; a long one goes on in the next."""
+        """Take messages into a batch; a long one continues in the next."""
         while self.ready and self._batch < BATCH:
             if not self._rest:
                 message = self.pipe.take()
@@ -250,6 +250,7 @@ class ZmtpEnd:
                     return
                 payload, self._rest = message
                 self._position += self._rest
+                # Only byte counts travel: the other end delivers it once its count gets there.
                 self.other._arriving.append((self._position, payload))
             part = min(self._rest, BATCH - self._batch)
             self._rest -= part

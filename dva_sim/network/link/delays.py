@@ -1,6 +1,6 @@
-"""Laws of the one-way delay: how far each packet's is from the link's `delay_s`.
+"""Laws of the one-way delay: the deviation of each packet's delay from the link's `delay_s`.
 
-A law turns a uniform number into a deviation. Where that number comes from makes deviations
+A law turns a uniform number into a deviation. The source of these numbers makes deviations
 independent from packet to packet, or correlated in time.
 """
 
@@ -28,7 +28,7 @@ from dva_sim.network.link.time_noise import (
 Quantile = Callable[[float], float]
 Seconds = Annotated[float, Field(ge=0, le=30)]
 PositiveSeconds = Annotated[float, Field(gt=0, le=30)]
-_SDS = 3.0  # a normal law keeps so many standard deviations above zero
+_SDS = 3.0  # minimum mean of a normal law, in standard deviations
 
 
 Wobble = Callable[[float], float]
@@ -41,7 +41,7 @@ def by_quantile(quantile: Quantile, uniforms: UniformNumbers) -> Wobble:
 
 
 class ConstantDelay(Config):
-    """All packets take `delay_s`: what is meant where no law is named."""
+    """Constant delay `delay_s` of all packets: the default."""
 
     law: Literal["constant"]
 
@@ -77,7 +77,7 @@ class _Law(Config):
 
     @abstractmethod
     def moments(self, delay: float) -> tuple[float, float]:
-        """Mean and standard deviation [s] of the one-way delay, `delay` being `delay_s`."""
+        """Return mean and standard deviation of the one-way delay [s]; `delay` is `delay_s`."""
 
     @abstractmethod
     def quantile(self, delay: float) -> Quantile:
@@ -106,7 +106,7 @@ class Normal(_Law):
 
     @override
     def check(self, delay: float) -> None:
-        # What would arrive before it is sent has to be negligible.
+        # The share of packets that would arrive before they are sent has to be negligible.
         if _SDS * self.sd_s > delay:
             raise ValueError(
                 f"delay_law.sd_s {self.sd_s:g} of a normal law is above a third of delay_s "
@@ -165,6 +165,7 @@ class ShiftedExponential(_Law):
     @override
     def quantile(self, delay: float) -> Quantile:
         above = delay - self.least_s
+        # The inverse of the exponential law, shifted so that its mean is zero.
         return lambda u: -above * (1.0 + math.log(max(1.0 - u, 1e-16)))
 
 
@@ -172,8 +173,8 @@ class Empirical(_Law):
     """One of the given delays each time; `delay_s` comes on top of them.
 
     Attributes:
-        delays_s: The delays; or else
-        file: names a file with one a line [ms].
+        delays_s: The delays; alternative to `file`.
+        file: File with one delay per line [ms].
     """
 
     law: Literal["empirical"]
@@ -212,7 +213,7 @@ def _above_least(least: float, delay: float) -> None:
 
 
 def _constant_by_name(value: Any) -> Any:
-    """Return the one law without keys of its own needs no mapping."""
+    """Accept the name `constant` in place of a mapping: that law has no keys of its own."""
     if isinstance(value, str) and value != "constant":
         raise ValueError("a law is a mapping, such as {law: gamma, sd_s: 0.02}, or constant")
     return {"law": value} if isinstance(value, str) else value

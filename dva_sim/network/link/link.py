@@ -84,7 +84,7 @@ class Link:
         self._take(link)
 
     def _take(self, link: LinkConfig) -> None:
-        """Be like this from now on, but for the queue."""
+        """Adopt the properties of a configuration, except for the queue."""
         replay = _make_replay(link, self._direction, self._streams, self.name)
         self.delay = link.moments()[0]
         self._base = link.delay_s
@@ -97,7 +97,7 @@ class Link:
         self._takes_trains = self._is_steady and not self._counts_packets
 
     def change(self, now: float, config: LinkConfig) -> None:
-        """Be like another link from `now` on [s]: delay, its law, loss and rate.
+        """Adopt delay, law, loss and rate of another configuration from `now` on [s].
 
         Packets already sent keep their fate, and nothing overtakes it, unless the link may reorder.
         What is sent from now on finds as many bytes in the queue, at the new rate where a rate is
@@ -115,6 +115,7 @@ class Link:
             self._line.change_rate(now, link.rate_bps)
             self.rate_bps = link.rate_bps
         if not self._may_overtake:
+            # A deviation, even of zero, makes `carry` keep packets behind those sent before.
             self._last_arrival = max(self._last_arrival, before)
             self._wobble = self._wobble or _no_deviation
             self._is_steady = self._takes_trains = False
@@ -138,6 +139,7 @@ class Link:
         if left_at is None:
             self.dropped += 1
             return None
+        # Packets are lost behind the queue: they have taken its room and the line's time.
         self.bytes += size
         is_out = self._outage is not None and self._outage(now, left_at)
         for fate in self._fates:
@@ -196,7 +198,7 @@ def _no_deviation(now: float) -> float:
 def make_serialiser(
     config: LinkConfig, direction: Direction, streams: Streams, name: str
 ) -> Serialiser:
-    """Return a factory for the rate of the `up` or `down` direction of a configured link.
+    """Return the serialiser of the `up` or `down` direction of a configured link.
 
     A run begins somewhere in a trace; two that were recorded together begin at the same moment.
 
@@ -214,7 +216,7 @@ def make_serialiser(
 def _make_fates(
     link: LinkConfig, replay: Replay | None, streams: Streams, name: str, make: MakeNumbers
 ) -> tuple[Fate, ...]:
-    """Return all chances that may take a packet of one direction."""
+    """Return the causes of random loss in one direction."""
     fates: list[Fate] = [replay.takes] if replay else []
     if link.loss:
         uniforms = make(streams, f"{name}/loss")
@@ -254,8 +256,8 @@ def _make_replay(
 class PartedLink(Link):
     """A link that others use too, seen by a pair of nodes that it does not always serve.
 
-    Its queue, its weather and its counts are the whole link's; a packet that is kept back does
-    not take up room.
+    Queue, delay, loss and counters are those of the whole link; a packet that a partition drops
+    takes no room.
 
     Args:
         whole: The link.
@@ -284,7 +286,7 @@ class PartedLink(Link):
 
     @override
     def carry_train(self, now: float, packets: int, size: int) -> float | None:
-        # Packets that are kept back are looked at one by one.
+        # Packets that a partition drops are counted one by one.
         if any(gap.covers(now) for gap in self._gaps):
             return None
         return self._whole.carry_train(now, packets, size)
@@ -299,7 +301,7 @@ class PartedLink(Link):
 
 
 def check_partitions(partitions: Sequence[Partition], names: Collection[str]) -> None:
-    """Refuse a partition that concerns nobody.
+    """Refuse a partition that separates no nodes.
 
     Raises:
         ConfigError: no node has a name that it gives.
@@ -331,7 +333,7 @@ def part_links(
 
 
 class Reception(Protocol):
-    """The quality of a radio link at one place, on top of what the link is like anyway."""
+    """Quality of a radio link at one place, in addition to the link's own."""
 
     @property
     def loss(self) -> float:

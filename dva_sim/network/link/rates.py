@@ -1,4 +1,4 @@
-"""Rates of links: a serial line, or a recorded one; and its queue."""
+"""Rates of links: a serial line or a recorded one, and the queue before it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-OPPORTUNITY_BYTES = 1500  # what one line of a Mahimahi trace lets through
+OPPORTUNITY_BYTES = 1500  # bytes that one line of a Mahimahi trace lets through [B]
 
 
 class Serialiser(ABC):
-    """Turns queued bytes into departures, in order.
+    """Serialiser of a link: turns queued bytes into departures, in order.
 
     Attributes:
         rate_bps: Its rate [bit/s]; None where it varies.
@@ -51,7 +51,7 @@ class ConstantRate(Serialiser):
         self._free_at = 0.0
 
     def change_rate(self, now: float, rate_bps: float) -> None:
-        """Go on at another rate [bit/s] with the bytes that wait."""
+        """Continue with the waiting bytes at another rate [bit/s]."""
         waiting = self.backlog_bytes(now)
         self.rate_bps = rate_bps
         self._seconds_per_byte = 8.0 / rate_bps
@@ -113,6 +113,7 @@ class TraceRate(Serialiser):
     def _first_at(self, now: float) -> int:
         """Return the running number of the first opportunity not before `now`."""
         laps, inside = divmod(now + self._offset, self._period)
+        # A rounding error must not skip the opportunity of this very millisecond.
         inside -= 1e-9
         return int(laps) * len(self._times) + int(np.searchsorted(self._times, inside))
 

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.streams import Streams
 
-SLOT_S = 0.001
-_BLOCK = 8192  # slots drawn at once
-_STEP = int(0.6180339887498949 * 2.0**64) | 1  # the golden ratio of all bits
+SLOT_S = 0.001  # resolution of the noise in time [s]
+_BLOCK = 8192  # random numbers drawn at once
+_STEP = int(0.6180339887498949 * 2.0**64) | 1  # golden ratio of 2**64, odd: visits every number
 _MASK = 2**64 - 1
 _NORMAL = NormalDist()
-_EDGE = 1e-12  # quantiles of unbounded laws are asked for inside (edge, 1 - edge) only
+_EDGE = 1e-12  # quantiles are limited to (edge, 1 - edge): unbounded laws are infinite beyond
 
 
 class UniformNumbers(Protocol):
@@ -140,7 +140,7 @@ class SlowNoise:
         return _NORMAL.cdf(self._block[inside])
 
     def _go_on(self) -> None:
-        """Draw the next block, also where nobody looks: what follows hangs on it."""
+        """Draw the next block, even if it is not read: the process continues from it."""
         steps = self._fresh * self._rng.standard_normal(_BLOCK)
         keep = self._keep
         chain = accumulate(steps.tolist(), lambda x, step: keep * x + step, initial=self._last)

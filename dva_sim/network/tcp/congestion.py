@@ -50,7 +50,7 @@ class Reno:
             self._avoid(segments, now, ahead)
 
     def reduce(self, now: float) -> float:
-        """Return the new threshold [segments] after a loss; others bring the window down."""
+        """Lower the threshold after a loss and return it [segments]; callers lower the window."""
         self.threshold = max(float(int(int(self.window) * self.BACKOFF)), MIN_WINDOW)
         self.window = float(int(self.window))
         return self.threshold
@@ -103,7 +103,7 @@ class Cubic(Reno):
         return super().reduce(now)
 
     def rests(self, now: float) -> None:
-        """Time in which the window is not used does not count (RFC 9438, section 5.8)."""
+        """Leave out time in which the window is not used (RFC 9438, section 5.8)."""
         if self._epoch >= 0:
             self._epoch += now - self._last
         self._last = now
@@ -120,6 +120,7 @@ class Cubic(Reno):
         target = max(self.curve(now - self._epoch + ahead), int(self._estimate))
         price = self._price(target)
         if self._saved >= price:
+            # Credit saved at a higher price is applied gently, as by Linux's tcp_cong_avoid_ai.
             self._saved = 0
             self.window += 1.0
         self._saved += segments
@@ -128,9 +129,9 @@ class Cubic(Reno):
         self.window += steps
 
     def _price(self, target: float) -> int:
-        """Segments to be delivered for one more in the window: at least two, for long none."""
+        """Return how many delivered segments open the window by one; at least two."""
         if target <= self.window:
-            return int(100 * self.window)
+            return int(100 * self.window)  # hardly any growth, as in Linux
         return max(2, int(self.window / (target - self.window)))
 
     def _begin(self, now: float) -> None:
@@ -142,7 +143,7 @@ class Cubic(Reno):
 
 
 class HyStart:
-    """Ends slow start when the round trip grows, before the queue overflows.
+    """End of slow start when the round trip grows, before the queue overflows.
 
     Rounds go from flight to flight. From a window of 16 segments on, the shortest of the
     round trips of a round, if they are more than eight, is compared with the shortest ever:
@@ -211,7 +212,7 @@ def make_window(options: TcpOptions) -> Reno:
 
 
 class RateReduction:
-    """Proportional rate reduction: how many segments may leave during recovery.
+    """Proportional rate reduction: number of segments that may leave during recovery.
 
     The conservative bound, and one more when the acknowledgement moved the left edge.
 

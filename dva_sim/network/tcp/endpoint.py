@@ -78,7 +78,7 @@ class TcpEndpoint:
 
     @property
     def congestion_window(self) -> float:
-        """[segments]."""
+        """Congestion window [segments]."""
         return self.sender.window.window
 
     def write(self, count: int) -> int:
@@ -109,6 +109,7 @@ class TcpEndpoint:
             return
         self._finished = True
         if self.readable or not self.established:
+            # RFC 1122, section 4.2.2.13: closing with unread data resets the connection.
             self.refuse()
         else:
             self.sender.finish()

@@ -1,4 +1,4 @@
-"""The receiving half of an end: order, the receive window, and when to acknowledge.
+"""Receiving half of an end: order, the receive window, and when to acknowledge.
 
 References:
     RFC 9293 (windows), RFC 2018 and 2883 (selective and duplicate acknowledgement),
@@ -21,13 +21,13 @@ from dva_sim.network.tcp.send_queue import SMALLEST
 
 FIRST_WINDOW = 65_160  # 45 full segments [B]
 MAX_WINDOW = 3_145_728  # half of tcp_rmem's third value [B]
-QUICK = 16  # segments acknowledged at once at the start and after trouble
-MAX_DELAY = 0.2  # of an acknowledgement in a dialogue [s]
-BLOCKS = 3  # that fit beside time stamps
+QUICK = 16  # segments acknowledged at once after a pause and after trouble
+MAX_DELAY = 0.2  # maximum delay of an acknowledgement in a dialogue [s]
+BLOCKS = 3  # selective acknowledgements that fit beside time stamps
 
 
 class Receiver:
-    """Segments in, bytes in order out.
+    """Receiver of an end: turns segments into bytes in order.
 
     Args:
         clock: The run's clock.
@@ -78,7 +78,7 @@ class Receiver:
         self._timer = Timer(clock, self._waited, options.tick)
 
     def take(self, start: int, end: int, now: float, pushes: bool) -> bool:
-        """Return bytes `start` to `end` arrive at `now` [s]; returns whether some are in order."""
+        """Take bytes `start` to `end` at `now` [s]; return True if some of them are in order."""
         if end <= self.next:
             self.duplicate = True
             self._hurry()
@@ -128,6 +128,7 @@ class Receiver:
 
     def wait(self, now: float) -> None:
         """Let the acknowledgement wait for something to ride on."""
+        # RFC 1122 allows half a second at most.
         longest = MAX_DELAY if self.dialogue else 0.5
         longest = min(longest, max(self._times.smoothed, self._options.delayed_ack))
         at = now + min(self._patience, longest)

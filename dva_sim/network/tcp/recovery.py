@@ -1,11 +1,11 @@
-"""Loss recovery of an end: when it begins, how far it goes, and whether it was needless.
+"""Loss recovery of an end: its beginning, its end, and whether it was needless.
 
-Segments are taken for lost by time (RACK), or by three later ones acknowledged.
+Segments count as lost by time (RACK), or once three later ones have been acknowledged.
 
 References:
     RFC 8985 (RACK, section 6, and the tail-loss probe's verdict), RFC 6675 (three duplicates),
     RFC 6937 (rate reduction), RFC 5681 and 6298 (after a time-out), RFC 3522 (needless recoveries,
-    told by time stamps).
+    detected by time stamps).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import MIN_TIMEOUT_S, RoundTrip
 from dva_sim.network.tcp.send_queue import Scoreboard, SentSegment
 
-DUPLICATES = 3
-_MICROSECOND = 1e-6  # the clock's step
+DUPLICATES = 3  # later segments acknowledged that make one count as lost
+_MICROSECOND = 1e-6  # resolution of the clock [s]
 _PERSISTS = 16  # recoveries for which a widened window stays wide (RFC 8985, section 6.2)
 
 
@@ -63,10 +63,11 @@ class ByTime:
         if sent.end > self._furthest:
             self._furthest = sent.end
         elif sent.end < self._furthest and not sent.repeated:
+            # It came after a later segment although it was sent only once: the network reorders.
             self._reordering = True
         taken = now - sent.sent_at
         if sent.repeated:
-            # out of order, the time stamp that comes back is an older one and tells nothing
+            # A segment out of order does not update the echoed time stamp, which then says nothing.
             earlier = echo < sent.sent_at and not sent.sacked
             if earlier or taken < self._times.minimum - _MICROSECOND:
                 return  # an earlier sending of it has arrived
@@ -157,7 +158,7 @@ LOSS = "loss"
 
 
 class Recovery:
-    """Open, recovering from losses found by acknowledgements, or from a time-out.
+    """State of recovery: open, recovering from losses found by acknowledgements, or a time-out.
 
     Args:
         options: Options of this end.
@@ -167,7 +168,7 @@ class Recovery:
 
     Attributes:
         state: `open`, `recovery` or `loss`.
-        losses: The judge of what is lost.
+        losses: Rule by which segments count as lost.
         probe_end: First byte beyond the last tail-loss probe; -1 if none is open.
     """
 
@@ -230,7 +231,7 @@ class Recovery:
         """Judge whether the probe mended a loss by itself: RFC 8985, section 7.4.
 
         Args:
-            now: [s].
+            now: Time [s].
             acknowledged: First byte that is missing at the other end.
             news: The acknowledgement moved the left edge or selects something.
             duplicate: Something has arrived twice there.
@@ -264,7 +265,7 @@ class Recovery:
             self.state = OPEN
 
     def find(self, now: float, next_byte: int) -> float:
-        """Look for losses; returns when one in doubt is to be looked at again [s], or 0."""
+        """Look for losses; return when a segment in doubt must be checked again [s], or 0."""
         board = self._board
         wait = self.losses.detect(board, now, self.state != OPEN)
         if board.lost and self.state == OPEN:
@@ -273,7 +274,7 @@ class Recovery:
         return now + wait + MIN_TIMEOUT_S if wait else 0.0
 
     def hold(self, delivered: int, whole: bool) -> bool:
-        """Keep the congestion window down while recovering; returns whether it does.
+        """Keep the congestion window down while recovering; return True if it does.
 
         Args:
             delivered: Segments newly acknowledged.
@@ -308,4 +309,4 @@ class Recovery:
         self.probe_end = -1
         board = self._board
         if not (board.resent or board.queue[0].repeated):
-            self._first_repeat = inf  # otherwise the one of the recovery before still counts
+            self._first_repeat = inf  # otherwise that of the recovery before still counts

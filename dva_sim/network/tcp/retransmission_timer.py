@@ -1,4 +1,4 @@
-"""The one retransmission timer of an end: what it waits for, until when, and how long.
+"""Retransmission timer of an end: the event it waits for, its deadline, and the time-out.
 
 The time-out follows the round trip as the sender sees it. The timer is moved far more often than
 it rings, and moving it later costs nothing: the event already scheduled looks, when it is due,
@@ -81,6 +81,7 @@ class RoundTrip:
         spread = 4 * self.variance if self._options.rtt_variance else self._options.min_rto
         timeout = min(self.smoothed + spread, self._options.max_rto)
         tick = self._options.tick
+        # The margin keeps a rounding error from adding a whole tick.
         self.timeout = ceil(timeout / tick - 1e-6) * tick if tick else timeout
 
     def shortest(self, rtt: float) -> None:
@@ -106,9 +107,9 @@ class RoundTrip:
             self._largest = self._floor
 
 
-_SLACK_S = 1e-6  # the clock counts whole microseconds
+_SLACK_S = 1e-6  # resolution of the clock [s]
 _INNERMOST = 64  # ticks that the finest ring covers
-_COARSER = 8  # each next ring
+_COARSER = 8  # factor by which each further ring is coarser
 
 
 class Timer:
@@ -141,7 +142,7 @@ class Timer:
             self._schedule(deadline)
 
     def stop(self) -> None:
-        """Do not ring."""
+        """Cancel the deadline."""
         self.deadline = inf
 
     def _schedule(self, due: float) -> None:
@@ -183,7 +184,7 @@ WINDOW = "window"
 
 
 class Alarm:
-    """Waits for whatever comes first.
+    """Alarm of an end: the earliest of its deadlines.
 
     Args:
         clock: The run's clock.
@@ -215,7 +216,7 @@ class Alarm:
         return min(self._times.timeout * 2.0**self.back_off, self._options.max_rto)
 
     def stop(self) -> None:
-        """Wait for nothing."""
+        """Cancel all deadlines."""
         self._timer.stop()
 
     def restart(self, now: float) -> None:
@@ -240,7 +241,7 @@ class Alarm:
         """Set the alarm for segments under way.
 
         Args:
-            now: [s].
+            now: Time [s].
             board: The segments, at least one.
             advanced: Something was acknowledged in order.
             fresh: Something new was sent.

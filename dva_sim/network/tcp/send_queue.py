@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from collections import deque
 
-PACKET_COST = 832  # beside the payload, of each packet that waits or is under way [B]
-SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]
-LARGEST = 4_194_304  # tcp_wmem, third value [B]
-PER_SEGMENT = 2304  # what automatic tuning counts for a full segment; x 2 x 10 at first [B]
-WAITING_SEGMENTS = 45  # how far a packet that waits may grow: 64 KiB with its headers
+PACKET_COST = 832  # charge of a packet to the send buffer on top of its payload [B]
+SMALLEST = 4608  # minimum of SO_SNDBUF, after doubling [B]
+LARGEST = 4_194_304  # maximum of automatic tuning, the third value of tcp_wmem [B]
+PER_SEGMENT = 2304  # charge of a full segment in automatic tuning; twice ten at first [B]
+WAITING_SEGMENTS = 45  # maximum segments in a waiting packet: 64 KiB with its headers
 
 
 class SendBuffer:
@@ -76,13 +76,14 @@ class SendBuffer:
         return 3 * self.used <= 2 * self.limit
 
     def take(self, count: int) -> int:
-        """Return the charge up to `count` bytes [B]; returns how many found room."""
+        """Take up to `count` bytes [B]; return how many found room."""
         waiting = self._waiting
         taken = 0
         if waiting and waiting[-1] < self._packet:
             taken = min(count, self._packet - waiting[-1])
             waiting[-1] += taken
             self.used += taken
+        # The last packet begun below the limit may exceed it.
         while taken < count and self.used < self.limit:
             part = min(count - taken, self._packet)
             waiting.append(part)
@@ -206,7 +207,7 @@ class Scoreboard:
         return len(self.queue) - self.sacked - self.lost + self.resent
 
     def clear(self) -> None:
-        """Forget all of them."""
+        """Forget all segments."""
         self.queue.clear()
         self.sacked = self.lost = self.resent = 0
 
@@ -236,7 +237,7 @@ class Scoreboard:
         return gain
 
     def mark_lost(self, sent: SentSegment) -> None:
-        """Hold a segment, or its repetition, to be lost."""
+        """Mark a segment, or its repetition, as lost."""
         if not sent.lost:
             sent.lost = True
             self.lost += 1
@@ -262,7 +263,7 @@ class Scoreboard:
             self.resent += 1
 
     def merge(self, index: int, mss: int) -> int:
-        """Let a segment swallow its small neighbours behind it: the charge set free [B]."""
+        """Merge the small segments behind one into it; return the charge set free [B]."""
         sent = self.queue[index]
         free = 0
         while index + 1 < len(self.queue):

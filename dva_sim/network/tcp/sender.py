@@ -1,8 +1,8 @@
-"""The sending half of an end: what may leave, and when.
+"""Sending half of an end: which segments may leave, and when.
 
 References:
     RFC 9293 (sliding window), RFC 5681 and 7661 (a window that is not used does not grow),
-    RFC 6298 (round trips are never taken from what was sent twice), RFC 896 and
+    RFC 6298 (round trips are never taken from segments sent twice), RFC 896 and
     draft-minshall-nagle-01 (small segments wait for the last small one).
 """
 
@@ -23,7 +23,7 @@ Blocks = tuple[tuple[int, int], ...]
 
 
 class Sender:
-    """Bytes in, segments out.
+    """Sender of an end: turns bytes into segments.
 
     Args:
         clock: The run's clock.
@@ -107,7 +107,7 @@ class Sender:
         self._push(self._clock.now)
 
     def stop(self) -> None:
-        """Forget what is under way."""
+        """Forget all data, sent or not."""
         self._alarm.stop()
         self.total = self.next
         self.board.clear()
@@ -141,6 +141,7 @@ class Sender:
         if self.board.queue and (news or self.recovery.probe_end >= 0):
             self._digest(now, acknowledged, blocks, duplicate, echo)
         elif self.total > self.next:
+            # Nothing is under way: a window has opened, or a probe of it was answered.
             if self.edge > self.next:
                 self._alarm.back_off = 0
             self._push(now)
@@ -184,6 +185,7 @@ class Sender:
                 last = now - sent.sent_at
                 first = first or last
         if not first and advanced:
+            # All were sent more than once; the echoed time stamp tells which sending arrived.
             first = last = now - echo
         if first:
             self._alarm.back_off = 0  # RFC 6298, section 5: not before there is a new sample
@@ -201,7 +203,8 @@ class Sender:
                     self.window.threshold = self.window.window
 
     def _grow(self, delivered: int, now: float) -> None:
-        """Open the congestion window, if it was used."""
+        """Open the congestion window, if it was in use."""
+        # In slow start Linux counts a window as used up to twice what has been under way.
         slow_start = self.window.window < self.window.threshold
         if self._window_used or (slow_start and self.window.window < 2 * self._most_out):
             shortest = self.times.minimum
@@ -212,7 +215,7 @@ class Sender:
     # Sending
 
     def _push(self, now: float) -> None:
-        """Send what may leave of what was written."""
+        """Send what may leave, and set the alarm for it."""
         before = self.next
         self._transmit(now)
         if self.next > before or not self.board.queue:
