@@ -1,12 +1,11 @@
 """Messages to bytes and back, by `protocol/dva.xsd`.
 
 The output of `encode` is valid by construction. `decode` trusts nobody: `schema` validates every
-message. Only messages in the very form that `encode` gives them, of the kinds that a drive is made
-of, take a shorter way: a command goes through here ten times a second and more, and a regular
-expression reads it several times as fast as a validating parser. It is narrower than the schema:
-it lets pass nothing that the schema refuses, and what it does not know is left to the parser. The
-bounds of real numbers are in the digits that may stand before the point, so that no rounding
-decides.
+message. Only the frequent messages of a drive, in exactly the form that `encode` gives them, take
+a shorter path: commands come ten times a second and more, and a regular expression reads them
+several times as fast as a validating parser. The expressions are narrower than the schema: they
+accept nothing that the schema refuses, and leave everything else to the parser. The bounds of real
+numbers are in the digits allowed before the point, so that no rounding decides.
 """
 
 from __future__ import annotations
@@ -145,7 +144,7 @@ def _whole(kind: str) -> _Match:
 
 
 _LAST: Final = 26
-"""So many last bytes tell the kinds apart, which is quicker than trying every pattern."""
+"""Number of last bytes that distinguish the kinds, which is quicker than trying every pattern."""
 _REGISTERS: Final = b"</IpAddr></RegMsg></msg>"
 
 _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] = {
@@ -160,9 +159,9 @@ _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] 
 
 
 def read_canonical(data: bytes) -> m.Message | None:
-    """Return the message, if this is one of those known here.
+    """Return the message, if it has one of the forms known here.
 
-    Else None, which says nothing about it.
+    None says nothing about its validity.
     """
     reader = _READERS.get(data[-_LAST:]) or _READERS.get(data[-len(_REGISTERS) :])
     if reader is None:
@@ -183,14 +182,11 @@ def read_canonical(data: bytes) -> m.Message | None:
     )
 
 
-"""No message is longer."""
-
-
 def timestamp(seconds_of_day: float, exact: bool = False) -> str:
     """Return the time of day as `HH:MM:SS`; midnight wraps.
 
     Args:
-        seconds_of_day: [s]
+        seconds_of_day: Seconds since midnight [s].
         exact: True for microseconds; otherwise fractions are dropped.
     """
     whole = int(seconds_of_day // 1)

@@ -1,4 +1,4 @@
-"""Devices as the DVA knows them: their types, the roles of control rooms, and when it forgets."""
+"""Devices as the DVA knows them: types, roles of control rooms, and when they are forgotten."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ ROBOT: Final = "Robot"
 GUARD: Final = "Guard"
 OPERATOR: Final = "TeleOp"
 DETECTOR: Final = "Sensor"
-REMOTE: Final = "Remote Control"  # may drive robots, and is sent no orders
-CONTROL_ROOM: Final = "ControlRoom"  # sees and decides; may drive as its role allows
+REMOTE: Final = "Remote Control"  # may drive robots, but gets no orders
+CONTROL_ROOM: Final = "ControlRoom"  # observes and decides; may drive if its role allows it
 PEER: Final = "DVA"  # another DVA, which serves other regions
 
-FORGET_AFTER: Final = 60.0  # without a word of it [s]
+FORGET_AFTER: Final = 60.0  # silence after which a device is forgotten [s]
 
 
 class ControlRoomRole(StrEnum):

@@ -41,7 +41,7 @@ def bad(reason: str) -> ProtocolError:
 
 
 def writer(element: str, kind: str) -> Write:
-    """Return what writes a value of a simple type as the text of an element of that name."""
+    """Return a function that writes a value of a simple type as the text of an element."""
     limits_of_kind = limits.facets(kind)
     base = limits_of_kind["base"][0]
     if "enumeration" in limits_of_kind:
@@ -61,8 +61,8 @@ def _real(element: str, kind: str) -> Write:
 
     def write(value: float) -> str:
         if low <= value <= high:
-            # float() because a numpy scalar spells its own type in its repr; 0.0 for -0.0, which
-            # no reader expects of a speed.
+            # float(), because a NumPy scalar's repr contains its type; + 0.0 turns -0.0, which
+            # no reader expects of a speed, into 0.0.
             return repr(float(value) + 0.0)
         raise bad(f"{element} must be within {low:g} and {high:g}, not {value!r}")
 
@@ -128,7 +128,7 @@ class Form:
         for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
             tag = node.get("name", "")
             least, most = limits.occurs(node)
-            # A value may be absent, or be there several times.
+            # The type inside an optional value or a list.
             kinds = [each for each in get_args(hint) if each not in (type(None), Ellipsis)]
             inner = _value_of(node, kinds[0] if kinds else hint)
             if most > 1:
@@ -173,14 +173,14 @@ class Form:
 
 
 def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
-    """Return what takes the values of these attributes from a message."""
+    """Return a function that takes the values of these attributes from a message."""
     if len(names) > 1:
         return attrgetter(*names)
     return lambda body: tuple([attrgetter(name)(body) for name in names])
 
 
 def _value_of(node: _Element, kind: Any) -> Form | _Value:
-    """Return how the inside of an element is written and read."""
+    """Return the form of an element's content."""
     if not limits.is_simple(node):
         return Form(kind, limits.children(node))
     write = writer(node.get("name", ""), node.get("type", ""))
@@ -192,7 +192,7 @@ def _str(element: _Element) -> str:
 
 
 def _optional(tag: str, write: Write, absent: Any) -> Write:
-    # The usual value is left out, so that a receiver of an earlier version understands the rest.
+    # A default value is left out, so that receivers of earlier versions understand the rest.
     def write_other(value: Any) -> str:
         return "" if value == absent else f"<{tag}>{write(value)}</{tag}>"
 

@@ -10,16 +10,16 @@ from hashlib import blake2b
 from dva_sim.protocol.codec import encode, timestamp
 from dva_sim.protocol.messages import Body, Heartbeat, Message, make_message
 
-NOON = 43_200.0  # when a run in virtual time begins [s since midnight]
-LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
-A_DAY = 345_600  # sessions: the DVA hands out at most four a second
+NOON = 43_200.0  # start of a run in virtual time [s since midnight]
+LOW_BITS = 32  # random bits of a session, so that nobody can guess it; the bits above only grow
+A_DAY = 345_600  # sessions in a day, at most four a second
 
 
 def is_absurd(session: int, highest: int) -> bool:
     """Return True for a session number that no honest DVA can have reached by now.
 
-    It is more than a day ahead of the highest that is known, or leaves no room for another day.
-    Without any known session (0) the former cannot be checked.
+    It is more than a day ahead of the highest known one, or leaves no room for another day.
+    Without a known session (0) only the latter can be checked.
     """
     count = session >> LOW_BITS
     newest = (1 << LOW_BITS) - 1
@@ -27,13 +27,13 @@ def is_absurd(session: int, highest: int) -> bool:
 
 
 class Outbox:
-    """Puts headers on what a device says.
+    """Headers and numbers for the messages of a device.
 
     Args:
         source: Id of the device.
         start_of_day: Time of day at which the run starts [s since midnight].
-        exact: Timestamps to the microsecond. In real time they have to tell the messages of a
-            device from those of its former life, which are numbered alike.
+        exact: True for timestamps in microseconds. In real time they distinguish the messages of a
+            device from those before its restart, which have the same numbers.
     """
 
     def __init__(self, source: str, start_of_day: float = NOON, exact: bool = False) -> None:
@@ -43,7 +43,7 @@ class Outbox:
         self._last_id = 0
 
     def set_clock(self, by: float) -> None:
-        """Set the clock on the wall that its timestamps show, by so many seconds [s]."""
+        """Set the wall clock of its timestamps forward by a time [s]."""
         self._start += by
 
     def message(self, destination: str, body: Body, now: float, session: int = 0) -> Message:
@@ -67,7 +67,7 @@ def key_of(sender: str | None, request: bytes) -> Key:
 
 
 class _Kept:
-    """The replies to one source: what they are known by, and how long they are in all [B]."""
+    """Replies to one source: their keys, and their total size [B]."""
 
     __slots__ = ("keys", "used")
 
@@ -77,16 +77,16 @@ class _Kept:
 
 
 class ReplyCache:
-    """Replies already given, so that a request sent again acts once.
+    """Replies already given, so that a repeated request acts only once.
 
-    A request is known by its bytes and by whose key it came: a reply to an impostor is not
-    for the one it played. A device that restarts counts its MessageIDs from 1
-    again, and must not be given the answers of its former life.
+    A request is recognised by its bytes and the key it came with: a reply to an impostor is not
+    for the device it imitated. A device that restarts counts its MessageIDs from 1 again, and must
+    not get the replies to its earlier requests.
 
     Args:
-        each: Maximum number of replies kept per source. The oldest are forgotten first, so that no
-            source can make another's be forgotten.
-        sources: Maximum number of sources; those longest unheard of are forgotten first.
+        each: Maximum number of replies kept per source. The oldest are dropped first, so that no
+            source can displace another's replies.
+        sources: Maximum number of sources; those silent longest are dropped first.
         room: Maximum size of the replies kept per source, without the last one [B].
     """
 
@@ -128,23 +128,23 @@ class Hearing(Enum):
     IGNORED = "ignored"
 
 
-ANSWERED, READ, IGNORED = Hearing  # found faster than as members of their class
+ANSWERED, READ, IGNORED = Hearing  # globals: looking a member up is slow
 
 
 class Nuisances:
     """Peers whose messages are refused on arrival, and who are increasingly ignored; pure.
 
-    Each connection has a count of its bad messages that goes down with time, and is halved by
-    each good one. Above `UNANSWERED` nobody tells it any more what was wrong; above `UNREAD` it is
-    not read, but for what may be an emergency, until it has been quiet for a while. What it sends
-    meanwhile is counted like all that is refused.
+    Each connection has a count of its bad messages, which falls with time and is halved by each
+    good message. Above `UNANSWERED` the connection gets no more replies to bad messages; above
+    `UNREAD` only possible emergencies are read, until it has been quiet for a while. What it sends
+    meanwhile is counted as refused.
     """
 
-    UNANSWERED = 20.0  # bad messages; a program that errs is told of it
-    UNREAD = 100.0
-    MOST = 200.0  # the count goes no higher: who stops is read again 10 s later
-    FORGIVEN = 10.0  # in a second
-    PEERS = 1000  # those longest unheard of are forgotten first
+    UNANSWERED = 20.0  # count up to which bad messages get a reply, for programs that err
+    UNREAD = 100.0  # count above which messages are not read
+    MOST = 200.0  # highest count: a peer that stops is read again 10 s later
+    FORGIVEN = 10.0  # decrease of the count per second [1/s]
+    PEERS = 1000  # maximum number of peers; those silent longest are dropped first
 
     def __init__(self) -> None:
         self._counts: OrderedDict[Hashable, tuple[float, float]] = OrderedDict()

@@ -1,7 +1,7 @@
 """Decisions with author, reason and outcome: the facts of an audit log.
 
-A fact is a value: a recorder of facts needs nothing else of the DVA. `AuditRecord` tells of one as
-far as a message can hold it.
+A fact is a value: a recorder of facts needs nothing else of the DVA. `AuditRecord` is its form as a
+message, as far as a message can hold it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Fact:
     Attributes:
         time: Time by the DVA's clock [s].
         author: Id of the device that decided; the DVA's for its policy and its rules.
-        label: Label of the author: of the policy its name, of a rule `rule`.
+        label: Label of the author; for the policy its name, for a rule `rule`.
         role: Role of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
         action: Kind of decision: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
             `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`,
@@ -35,7 +35,7 @@ class Fact:
         cause: Reason in words of the author.
         code: `messages.OK`, or why it was refused.
         outcome: Result in words; for a refusal its reason.
-        advised: Id of whom the policy would have sent; None: nobody, or that is no matter here.
+        advised: Id of the device that the policy would have sent; None: none, or not applicable.
         advised_in: Expected arrival of the advised device [s from then].
         waited: Time since the first report of the event [s].
     """

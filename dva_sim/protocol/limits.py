@@ -1,6 +1,6 @@
-"""Limits of `protocol/dva.xsd` as data: every limit and every word on the wire.
+"""Limits of `protocol/dva.xsd` as data: every limit and every name on the wire.
 
-Writer, reader and checker all derive from it what they refuse.
+Writer, reader and checker all derive their checks from it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from dva_sim.kernel.resources import roots
 
 _XS: Final = "{http://www.w3.org/2001/XMLSchema}"
 WHOLE: Final = {"xs:unsignedInt": 2**32 - 1, "xs:unsignedLong": 2**64 - 1}
-"""Kinds of whole numbers that types start from, and the largest of each."""
+"""Base types of whole numbers, and the largest number of each."""
 
-# What a schema calls \P{Cc}, without what no XML can hold.
+# The schema's \P{Cc}, no control characters, without those that XML cannot hold.
 _CHARACTER: Final = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
 
 
@@ -39,7 +39,7 @@ def tree() -> etree._ElementTree:
 
 @cache
 def facets(name: str) -> dict[str, list[str]]:
-    """Return what restricts a simple type, the narrowest first, and `base`, its origin."""
+    """Return the restrictions of a simple type, narrowest first, and `base`, its base type."""
     limits: dict[str, list[str]] = {}
     while (restriction := _restrictions().get(name)) is not None:
         for facet in restriction.iterchildren(f"{_XS}*"):

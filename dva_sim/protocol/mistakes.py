@@ -53,8 +53,8 @@ def _in_words(limits_of_type: dict[str, list[str]]) -> str:
 
 
 READ_BYTES: Final = MAX_BYTES + 1
-"""Enough to know that a message is too long."""
-_SHOWN: Final = 60  # characters of a wrong value
+"""Bytes to read of a file: enough to know that a message is too long."""
+_SHOWN: Final = 60  # maximum characters shown of a wrong value
 
 _PIECES: Final = (
     (rb"<\?xml", "should begin <?xml"),
@@ -135,7 +135,7 @@ def _other_markup(data: bytes, start: int) -> Iterator[Problem]:
             continue
         texts = (text for form, text in _MARKUP if re.compile(form).match(data, offset))
         text = next(texts, None)
-        if text is not None:  # else it is no markup at all, which the parser tells better
+        if text is not None:  # otherwise it is not markup, and the parser explains it better
             yield at(data, offset, text)
 
 
@@ -159,7 +159,7 @@ def _by_schema(data: bytes) -> list[Problem]:
     schema.validate(tree)
     places = dict(zip(tree.iter("*"), _walk(data)[0], strict=True))
     problems: dict[int, Problem] = {}
-    log: Any = schema.error_log  # known to be iterable by lxml, not by its stubs
+    log: Any = schema.error_log  # iterable, although lxml's stubs do not say so
     for entry in list(log):
         element = _element_at(tree, entry.path)
         place = places[element]
@@ -201,7 +201,7 @@ def _explain(element: etree._Element, entry: Any) -> str:
 def _walk(data: bytes) -> tuple[list[_Place], int | None]:
     """Return the place of every element in file order, and the byte where it had to end."""
     parser = expat.ParserCreate("UTF-8")
-    parser.buffer_text = False  # else text is told where the next element begins
+    parser.buffer_text = False  # otherwise text is reported at the next element's position
     places: list[_Place] = []
     inside: list[_Place] = []
 
@@ -230,10 +230,7 @@ def _schema() -> etree.XMLSchema:
 
 
 def _plain_parser() -> etree.XMLParser:
-    """Return a parser without the schema, as harmless as the codec's.
-
-    A new one has an empty log.
-    """
+    """Return a parser without the schema, as safe as the codec's; a new one has an empty log."""
     return etree.XMLParser(
         encoding="UTF-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -241,7 +238,7 @@ def _plain_parser() -> etree.XMLParser:
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """One mistake.
+    """Mistake in a file.
 
     Attributes:
         line: Line in the file, from 1.
@@ -257,7 +254,7 @@ class Problem:
 
 
 def at(data: bytes, offset: int, text: str) -> Problem:
-    """Return the mistake at a byte of a text in UTF-8, whichever way its lines end."""
+    """Return the mistake at a byte of a text in UTF-8, with any line endings."""
     before = data[:offset].decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
     line_start = before.rfind("\n") + 1
     return Problem(before.count("\n") + 1, len(before) - line_start + 1, text)

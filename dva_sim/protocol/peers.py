@@ -11,7 +11,7 @@ from typing import Final
 
 from dva_sim.protocol.control_room import EventStatus
 
-MAX_REGIONS: Final = 16  # that one DVA serves
+MAX_REGIONS: Final = 16  # maximum regions that one DVA serves
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class PeerStatus:
 
     Attributes:
         regions: Regions that it serves; at most 16.
-        device_count: Number of devices that are there.
+        device_count: Number of registered devices that are not silent.
         open_events: Number of open events.
         free_responders: Number of guards and robots that it could send somewhere now.
     """

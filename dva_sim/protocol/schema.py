@@ -1,7 +1,7 @@
-"""Bytes checked against `protocol/dva.xsd` before anything is made of them.
+"""Validation of bytes by `protocol/dva.xsd` before they are used.
 
-libxml2 validates every message while parsing it, and what a schema cannot forbid is refused
-before: other encodings, other markup, entities, names that nobody knows.
+libxml2 validates every message while parsing it. What a schema cannot forbid is refused before
+that: other encodings, other markup, entities, unknown names.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dva_sim.protocol.elements import DECLARATION, read
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import BAD_MESSAGE, Message
 
-MAX_BYTES: Final = 8192
+MAX_BYTES: Final = 8192  # longest message [B]
 
 _OUR_DECLARATION = DECLARATION.encode()
 _DECLARATION = re.compile(
@@ -37,7 +37,7 @@ def read_validated(data: bytes) -> Message:
     """Return the message in any form that the specification allows."""
     _refuse_by_sight(data)
     try:
-        # libxml2 never forgets a run of blanks that it saw between elements.
+        # libxml2 keeps each run of blanks that it has seen between elements, for good.
         root = etree.fromstring(_BLANK_LINES.sub(b">\n<", data), _parser())
     except etree.XMLSyntaxError as error:
         # lxml spells some messages as the repr of their bytes.

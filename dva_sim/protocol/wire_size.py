@@ -1,6 +1,6 @@
-"""Limits of what fits into a message: lists are cut, and times are bounded."""
+"""Sizes that fit into a message: lists are cut, and times are bounded."""
 
-LIST_BYTES = 7000  # of a list, the rest of the message apart [B]
+LIST_BYTES = 7000  # maximum size of a list, without the rest of the message [B]
 LONGEST = 1e6  # longest time in a message [s]
 
 
@@ -10,5 +10,5 @@ def sent_time(seconds: float) -> float:
 
 
 def xml_size(text: str) -> int:
-    """Return the room for a text in XML, where a few signs take four bytes more [B]."""
+    """Return the maximum size of a text in XML, where three characters are escaped [B]."""
     return len(text.encode()) + 4 * sum(text.count(sign) for sign in "&<>")

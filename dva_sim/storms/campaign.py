@@ -1,4 +1,4 @@
-"""Campaigns of storms: run by processes of this machine, saved as they end, resumable."""
+"""Campaigns of storms, run by processes of this machine; saved as they end, and resumable."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from dva_sim.storms.storm import play
 
 HOUR = 3600.0
 REGIONS: Final = "regions"
-"""Stands for a profile where storms of several DVAs are played."""
+"""Name, used like a profile, for storms of several DVAs."""
 CONFIDENCE: Final = 0.95
-LOOK_EVERY = 1.0  # after the processes [s]
+LOOK_EVERY = 1.0  # interval of checks of the processes [s]
 
 
 @dataclass
@@ -59,7 +59,7 @@ class StormTally:
             self.failures[outcome.seed] = sorted(outcome.signature)
 
     def most_per_hour(self) -> float:
-        """Return the upper limit of failed storms in an hour of one team, exact (Garwood 1936)."""
+        """Return the exact upper limit of failed storms per hour of one team (Garwood 1936)."""
         if not self.hours:
             return float("inf")
         return float(chi2.ppf(CONFIDENCE, 2 * (len(self.failures) + 1)) / 2 / self.hours)
@@ -102,7 +102,7 @@ class Journal:
                 self.outcomes[row["profile"], row["seed"]] = outcome_of(row)
         except (ValueError, KeyError, TypeError) as error:
             raise ConfigError(f"is no journal of storms: {error}", file) from None
-        if rest:  # of a process that was killed while it wrote
+        if rest:  # part of a line: a process was killed while it wrote
             file.write_bytes(lines + b"\n" if lines else b"")
 
     def keep(self, profile: str, outcome: StormOutcome) -> None:
@@ -114,7 +114,7 @@ class Journal:
 
 
 def plain(outcome: StormOutcome) -> dict[str, Any]:
-    """Return an outcome as JSON has it."""
+    """Return an outcome as a JSON object."""
     return {
         **{key: value for key, value in vars(outcome).items() if key != "breaches"},
         "breaches": [vars(breach) for breach in outcome.breaches],
@@ -132,12 +132,12 @@ def outcome_of(row: dict[str, Any]) -> StormOutcome:
 def outcomes(
     seeds: Iterable[int], profile: str, journal: Journal, workers: Workers
 ) -> Iterator[tuple[StormOutcome, bool]]:
-    """Yield the outcomes of storms, and whether each was known before, as they come.
+    """Yield the outcomes of storms as they end, and whether each was in the journal before.
 
     Args:
         seeds: Seeds of the storms.
         profile: Profile of fault kinds.
-        journal: Keeps them.
+        journal: Journal of outcomes.
         workers: Workers that run the storms.
     """
     waiting = set[Future[StormOutcome]]()

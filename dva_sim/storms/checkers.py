@@ -1,8 +1,7 @@
-"""Rules that only storms check, each from outside.
+"""Rules that only storms check, from outside the agents.
 
 S5: a driver whose commands are refused stops driving. S10: queues, registry, caches and memory are
-bounded, by counting what is really there. S11: every message that is rejected is answered or
-counted.
+bounded; their elements are counted. S11: every rejected message is answered or counted.
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from dva_sim.storms.interference import PassingMessage
 
 # --- S5 ----------------------------------------------------------------------------------
 
-STOPS_WITHIN = 20.0  # of the first refusal, which may be as late as others [s]
-REFUSALS_IN_A_ROW = 3  # refusals in a row; the first may be of a former drive
+STOPS_WITHIN = 20.0  # time from the first refusal, which may arrive late like any message [s]
+REFUSALS_IN_A_ROW = 3  # refusals that count; the first may be of a former drive
 _BEGINS = b"<StartTeleOp"
 _COMMANDS = b"<SetTeleOp"
 _TELLS = b"<reply>", b"<RobotHolder>"
@@ -42,12 +41,12 @@ class _Refused:
 
 
 class RefusedDrivers:
-    """Sees what robots tell their drivers, and whether those go on all the same.
+    """Checker of drivers that continue although robots refuse their commands.
 
     Args:
         recorder: Recorder of drivers who continue.
         labels: Names by id.
-        drivers: Ids of those who have to stop.
+        drivers: Ids of the drivers that have to stop.
     """
 
     def __init__(self, recorder: Recorder, labels: dict[str, str], drivers: Container[str]) -> None:
@@ -86,7 +85,7 @@ class RefusedDrivers:
 
 
 def _refuses(data: bytes, to: str) -> bool | None:
-    """Return True if a robot refuses a driver, False if it obeys it, None if that is not told."""
+    """Return True if a robot refuses a driver, False if it obeys, None if neither is said."""
     message = decode_if_valid(data)
     body = None if message is None else message.body
     if isinstance(body, m.RobotHolder):
@@ -99,8 +98,8 @@ def _refuses(data: bytes, to: str) -> bool | None:
 # --- S10 ---------------------------------------------------------------------------------
 
 MAX_BREACHES: Final = 200
-"""Elements of a container without a bound of its own, beside one for each event there ever was: a
-team of fifteen devices needs 72 at most."""
+"""Maximum elements of a container without a bound of its own, on top of one for each event ever
+reported: a team of fifteen devices needs at most 72."""
 BOUNDS: Final[dict[str, int]] = {
     "Registry.entries": 20_000,
     "EventTable.open": 10_000,
@@ -126,7 +125,7 @@ _NOT_THEIRS: Final = (Recorder, Clock)
 _SHARED: Final = tuple(
     f"dva_sim.{room}." for room in ("storms", "worlds", "kernel", "simulation.scenario")
 )
-"""Modules of what no agent fills: checkers, the world, the scenario."""
+"""Modules of objects that no agent fills: checkers, the world, the scenario."""
 
 
 def waiting_of(inbox: CommandQueue, peer: str) -> int:
@@ -144,12 +143,12 @@ def is_waiting(inbox: CommandQueue, data: bytes) -> bool:
 def oversized(
     roots: Iterable[object], events: int = 0, left_out: Iterable[object] = ()
 ) -> Iterator[tuple[str, int, int]]:
-    """Yield each container that holds more than it may, of all that can be reached from objects.
+    """Yield each container that holds more than its bound, of all reachable from some objects.
 
     Args:
         roots: Agents; what they share with the whole run is left out.
         events: Number of events that the DVA has ever had.
-        left_out: Other objects that are not looked at, nor what only they hold.
+        left_out: Objects to skip, together with what only they hold.
 
     Yields:
         Class and attribute, number of elements, bound.
@@ -190,13 +189,13 @@ def _is_theirs(each: object) -> bool:
 
 # --- S11 ---------------------------------------------------------------------------------
 
-ANSWERED_WITHIN = 60.0  # unless it still waits in a queue [s]
-QUEUED_WITHIN = 300.0  # of a robot that takes 3 s for a message, and was driven meanwhile [s]
+ANSWERED_WITHIN = 60.0  # time to answer a request, unless it still waits in a queue [s]
+QUEUED_WITHIN = 300.0  # longest wait in a queue: a driven robot may take 3 s per message [s]
 
 
 @dataclass(eq=False, slots=True)
 class _Open:
-    """A request that a node has not answered yet, and from when on that is expected of it."""
+    """Request that a node has not answered yet; an answer is expected from `since` on."""
 
     node: str
     arrived: float
@@ -205,14 +204,14 @@ class _Open:
 
 
 class AnswerWatch:
-    """Sees what reaches the DVA, robots and people, and what they answer.
+    """Checker of the messages that reach the DVA, robots and people, and of their answers.
 
     Args:
         recorder: Recorder that counts refusals and notes broken rules.
         now: Function that returns the time [s].
-        nodes: Ids of those who have to answer, with their labels.
-        heard: Called with each answer: of whom, to whom, its bytes; whether it gets there or not.
-        waits: Returns True for a request that is still in the queue of a node.
+        nodes: Labels of the nodes that have to answer, by id.
+        heard: Callback for each answer, delivered or not: its sender, receiver and bytes.
+        waits: Predicate: True for a request that is still in the queue of a node.
     """
 
     def __init__(
@@ -234,14 +233,14 @@ class AnswerWatch:
         self._silently: dict[str, deque[float]] = {node: deque() for node in nodes}
 
     def excuse(self, node: str, excused: bool) -> None:
-        """Expect nothing of a node that is down, nor of what it had not answered by then."""
+        """Expect no answers from a node that is down, not even to earlier requests."""
         (self._excused.add if excused else self._excused.discard)(node)
         self._open = {each: None for each in self._open if each.node != node}
 
     def watch(self, passing: PassingMessage) -> None:
-        """Let a message reach its receiver; one that is none has to be answered or counted.
+        """Let a message reach its receiver; an invalid one has to be answered or counted.
 
-        Of each one that is refused while this one is taken, and is not answered, the time is noted.
+        The time of each refusal without an answer is noted.
         """
         node = passing.to
         if node not in self._nodes:
@@ -255,17 +254,17 @@ class AnswerWatch:
         self._silently[node].extend([self._now()] * (refused - answers))
         if node in self._excused or refused or answers:
             return
-        # Late replies are dropped with their request; a picture is no message.
+        # Late replies are dropped like their requests, and a picture is not a message.
         is_for_somebody = isinstance(passing.payload, bytes) and b"<reply>" not in passing.payload
         if is_for_somebody and not is_message(passing.payload):
             self._breach(node, "neither answers nor counts an invalid message")
 
     def tap(self, node: str) -> _Tap:
-        """Return what sees the requests to a node."""
+        """Return a tap on the requests to a node."""
         return _Tap(self, node)
 
     def opened(self, node: str, request: Request) -> Request:
-        """Note a request; return it with an answer that is seen."""
+        """Note a request; return it with a callback that notes its answer."""
         each = _Open(node, self._now(), self._now(), request.data)
         if node not in self._excused:
             self._open[each] = None
@@ -294,7 +293,7 @@ class AnswerWatch:
                 each.since = now
                 self._open[each] = None
                 continue
-            # Those that waited are judged after younger ones, whose counts are not theirs.
+            # Requests that waited are judged after younger ones, and must not use up their counts.
             silently = self._silently[each.node]
             while silently and now - silently[0] > QUEUED_WITHIN + ANSWERED_WITHIN:
                 silently.popleft()
@@ -314,7 +313,7 @@ class AnswerWatch:
 
 
 class _Tap:
-    """Sees the requests to one node; see `RequestTap`."""
+    """Tap on the requests to one node; see `RequestTap`."""
 
     def __init__(self, answers: AnswerWatch, node: str) -> None:
         self._answers = answers

@@ -1,4 +1,4 @@
-"""Draws a storm from its seed: team, site, link, policy, pattern, people, events and faults."""
+"""Random draw of a storm: team, site, link, policy, pattern, people, events and faults."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from dva_sim.storms.drivers import FIRST_NUMBER
 from dva_sim.storms.faults import DEADLINES, FAULTS, FaultKind
 from dva_sim.storms.plan import Fault, StormPlan
 
-FIRST = 15.0  # faults begin [s]
-STORM = 600.0  # faults have ended [s]
+FIRST = 15.0  # earliest start of a fault [s]
+STORM = 600.0  # end of the last fault [s]
 _SOURCES: Final = "", "operator", "driver", "dva", "robot"
 PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "all": tuple(FAULTS),
@@ -35,8 +35,8 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "none": (),
 }
 """Kinds of faults that each profile draws from."""
-SLOW_LINK = 1.0  # so much delay and more [s]; a link on which TCP sends its first segment twice
-SLOW_TIMEOUT = 12.0  # there the first answer over a new connection takes 9.1 s [s]
+SLOW_LINK = 1.0  # delay from which on TCP sends its first segment twice [s]
+SLOW_TIMEOUT = 12.0  # time-out there: the first answer over a new connection takes 9.1 s [s]
 
 
 def draw(seed: int, profile: str = "all") -> StormPlan:
@@ -121,7 +121,7 @@ def _link(chance: random.Random) -> dict[str, Any]:
 
 def _event(chance: random.Random, number: int) -> dict[str, Any]:
     kind = chance.choice(("fire", "gas_leak", "flood"))
-    last = chance.choice((60.0, STORM - 100.0))  # some come all at once
+    last = chance.choice((60.0, STORM - 100.0))  # early: many events within a minute
     return {
         "kind": kind,
         "at_s": round(chance.uniform(5.0, last), 1),

@@ -1,9 +1,9 @@
 """Drivers who are never idle: they keep robots moving, so that faults meet robots in motion.
 
-A driver keeps to the protocol, and is careless as people are: it falls silent at the wheel, stops
-late or not at all, gives a robot back while it moves, keeps one without driving it, wants more than
-a robot can, claims to see what is still to come, and asks for what its permission is not for. It
-takes robots from others, too.
+A driver keeps to the protocol, but is as careless as people are: it stops sending during a drive,
+stops late or not at all, gives a robot back while it moves, keeps one without driving it, commands
+impossible speeds, names pictures that were not taken yet, and requests what its permission does
+not include. It also takes robots from others.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.storms.intruder import Intruder, give_back
 
-FIRST_NUMBER: Final = 1000  # beyond all operators of a scenario, and all intruders
-RATES: Final = 2.0, 5.0, 8.0  # commands in a second
-MAX_WAIT = 20.0  # for a robot that was granted, and does not start [s]
-HOLD_S = 40.0  # a robot that is held and not driven: longer than a lease lasts [s]
+FIRST_NUMBER: Final = 1000  # number before the first driver: beyond all operators and intruders
+RATES: Final = 2.0, 5.0, 8.0  # rates of commands [Hz]
+MAX_WAIT = 20.0  # longest wait for the start of a granted robot [s]
+HOLD_S = 40.0  # time for which a robot is held without a drive: longer than a lease [s]
 LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
 LEVELS: Final = "teleoperation", "teleoperation", "both", "both", "missions"
 TAKEOVERS: Final[tuple[str | None, ...]] = (None, None, "ask", "force")
 INSISTS: Final = 2.0, 40.0, 40.0
-"""Times for which a driver insists on a robot that another has [s]: shorter or longer than the
-robot is stopped and reserved."""
+"""Times for which a driver insists on a robot of another [s]: shorter or longer than the robot is
+stopped and reserved."""
 
 
 class BusyDriver:
-    """One driver: takes a robot, drives it or sends it somewhere, gives it back, takes another.
+    """Driver that takes a robot, drives it or sends it somewhere, gives it back, takes another.
 
     Args:
         number: Number, from 1.
         robots: Ids of the robots.
         sensors: Names of the sensors that robots have.
-        chance: Everything that it decides.
-        place: Draws a place to send a robot to.
+        chance: Random numbers of its decisions.
+        place: Function that draws a place to send a robot to.
 
     Attributes:
         device: Its device, called `driver-1` and so on.
@@ -89,12 +89,12 @@ class BusyDriver:
         self._clock.every(1.0 / rate, lambda: self._command(until))
 
     def restart(self) -> None:
-        """Restart the app: it numbers its messages from 1, and knows of no robot."""
+        """Restart the app: it numbers its messages from 1 again, and has forgotten its robot."""
         self.device.restart()
         self.device.register()
         self._forget()
 
-    # --- what it does, once a second ---------------------------------------------------------
+    # --- actions, once a second --------------------------------------------------------------
 
     def _act(self, until: float) -> bool:
         now = self._clock.now
@@ -172,7 +172,7 @@ class BusyDriver:
             self._give_back()
 
     def _drive(self) -> None:
-        """Drive about, look at this and that meanwhile, and stop in one way or another."""
+        """Drive about with occasional requests, and stop in one of several ways."""
         chance = self._chance
         now = self._clock.now
         if now >= self._until:
@@ -207,7 +207,7 @@ class BusyDriver:
         send()
 
     def _watch(self) -> None:
-        """Watch how a mission goes, and call it off in the end, or just forget it."""
+        """Follow a mission, and cancel it in the end, or just forget it."""
         if self._clock.now < self._until:
             if self._chance.random() < 0.5:
                 self._order(m.GetMissionStatus())
@@ -217,7 +217,7 @@ class BusyDriver:
         self._finish(self._chance.uniform(1.0, 15.0))
 
     def _wait(self) -> None:
-        """Hold the robot without driving it; now and then ask for what it is not held for."""
+        """Hold the robot without driving it; now and then request what the permission excludes."""
         chance = self._chance
         if self._clock.now >= self._until:
             self._give_back()
@@ -253,7 +253,7 @@ class BusyDriver:
         self._forget()
 
     def _forget(self) -> None:
-        """Have no robot, and look for another one a little later."""
+        """Forget the robot, and look for another one a little later."""
         if self._frames is not None:
             self._frames.close()
         self._frames = None
@@ -266,7 +266,7 @@ class BusyDriver:
     # --- messages ----------------------------------------------------------------------------
 
     def _order(self, body: m.Body, begin: Callable[[], object] = lambda: None) -> None:
-        """Ask the robot for something; one that refuses its driver is given up."""
+        """Send the robot a request; give up a robot that refuses its driver."""
         life = self._life
 
         def answered(reply: m.Reply) -> None:
@@ -283,7 +283,7 @@ class BusyDriver:
         now = self._clock.now
         if self._does == self._drive and now >= self._hushed and not self.device.silent:
             body = self._wish._replace(seen_tick=self._tick)
-            if self._tick is not None and self._chance.random() < 0.02:  # a picture to come
+            if self._tick is not None and self._chance.random() < 0.02:  # a picture not taken yet
                 body = body._replace(seen_tick=self._tick + self._chance.randrange(100, 5000))
             if self._publishes:
                 message = self.device.outbox.message(self._robot, body, now, self._session)
@@ -295,7 +295,7 @@ class BusyDriver:
         return now < until
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        """Heed, mostly, that a session is over."""
+        """Answer a request; in most cases obey the end of a session."""
         body = message.body
         is_over = isinstance(body, m.PermissionRevocation) and body.session == self._session
         if is_over and self._robot and self._chance.random() < 0.7:

@@ -1,4 +1,4 @@
-"""The kinds of faults: what each does, whom it may strike, for how long and how hard."""
+"""Kinds of faults: their effects, possible targets, durations and strengths."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ DRIVERS: Final = ("operator", "driver")
 ON_MISSION: Final = ("GoTo", "Patrol", "GetMissionStatus")
 DRIVEN: Final = ("SetTeleOp", "SetTeleOp", "StartTeleOp", "PermissionGrant", *ON_MISSION)
 ON_DRIVING: Final = (*DRIVEN, "PermissionRevocation", "PermissionRevocation", "Reply", "Reply")
-DRIFT: Final = 200e-6  # of a robot's clock; a quartz is off by less, one that is slewed by more
-GIVEN_BACK: Final = 5.0  # after it was granted, what was asked for too much [s]
+DRIFT: Final = 200e-6  # drift of a robot's clock; a quartz drifts less, a slewed clock more
+GIVEN_BACK: Final = 5.0  # delay after which a superfluous permission is given back [s]
 HAND: Final = "somebody at the robot"
 DEADLINES: Final = (3.0, 6.0, 9.0, 10.0, 27.0, 30.0)
 """Watchdog, age limit, time-out, silence, three time-outs, lease [s]: a fault often lasts about
@@ -40,12 +40,12 @@ class FaultKind:
     """One kind of fault.
 
     Attributes:
-        words: Description for people.
+        words: Description for people; N is the strength.
         strikes: Kinds of devices that may be its target; empty: none is named.
         begin: Function that starts the fault; returns a function that ends it, if it is to be
             ended.
         lasts: Shortest and longest duration [s]; an act takes none.
-        value: Lowest and highest strength; `words` say of what.
+        value: Lowest and highest strength.
         on: Messages to the target that it may wait for.
         weight: Relative frequency of being drawn.
     """
@@ -63,7 +63,7 @@ class FaultKind:
 
 
 def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Begin:
-    """Return a rule for the messages between some nodes."""
+    """Return a fault that applies a rule to the messages between two nodes."""
 
     def begin(storm: StormScene, fault: Fault, chance: random.Random) -> End:
         source = storm.id_of(fault.source)
@@ -74,6 +74,7 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
         def meets(passing: i.PassingMessage) -> bool:
             if source not in ("", passing.source) or to not in ("", passing.to):
                 return False
+            # A rule that delivers a copy or an altered message has interfered, too.
             before = interference.delivered
             done = rule(interference, passing)
             if done or interference.delivered != before:
@@ -87,7 +88,7 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
 
 
 def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Return a process that is stopped: what comes and goes waits, and is there all at once."""
+    """Stop a process: its messages wait both ways, and arrive all at once in the end."""
     node = storm.id_of(fault.target)
     messages = list[i.PassingMessage]()
     interference = storm.interference
@@ -117,9 +118,10 @@ def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Let a copy of an order arrive again when what it began is over.
+    """Let a copy of an order arrive again after its effect has ended.
 
-    Meanwhile an intruder asks in the name of its sender, until the robot has forgotten its reply.
+    Meanwhile an intruder sends requests in the sender's name, until the robot has forgotten its
+    reply to the order.
     """
     robot = storm.id_of(fault.target)
     clock = storm.run.clock
@@ -135,7 +137,7 @@ def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 _ORDERS: Final = b"<StartTeleOp", b"<GoTo", b"<Patrol", b"<ReturnToBase"
 _HARMLESS: Final = m.GetMissionStatus()
-FORGOTTEN_AFTER: Final = 80  # requests, of which a robot remembers 64
+FORGOTTEN_AFTER: Final = 80  # requests that make a robot forget a reply: it keeps the last 64
 
 
 def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
@@ -163,7 +165,7 @@ _JUNK: Final[tuple[Callable[[str, random.Random], bytes], ...]] = (
 
 
 def _set_to(to: str, speed: str) -> bytes:
-    """Return a command whose speed is something else."""
+    """Return a command with another text in place of its speed."""
     message = m.Message(to, 1, to, "12:00:00", 1, m.SetTeleOp(0.25, 0.0))
     return encode(message).replace(b"0.25", speed.encode())
 
@@ -177,7 +179,7 @@ def _hang(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     storm.run.deafened(robot.id, True)
 
     def ends() -> None:
-        if robot.faults.frozen:  # else another fault has restarted it
+        if robot.faults.frozen:  # otherwise another fault has restarted it
             storm.run.deafened(robot.id, False)
             robot.faults.freeze(False)
 
@@ -189,9 +191,9 @@ def _restart(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _restart_program(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
-    """Restart the program of a robot, whose clock is another one then, or a little slow.
+    """Restart the program of a robot; its clock then differs at random, or is a little slow.
 
-    A robot without power runs none.
+    Without power nothing happens.
     """
     if not robot.agent.body.powered:
         return
@@ -234,7 +236,7 @@ def _blind(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _lie(storm: StormScene, fault: Fault, chance: random.Random) -> End | None:
-    """Return a sensor that says anything."""
+    """Make a sensor publish arbitrary values."""
     sensors = storm.robot(fault.target).agent.sensors
     if not sensors:
         return None
@@ -260,10 +262,10 @@ def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Take the robot by hand, as soon as it lets somebody, and drive about.
+    """Take the robot by hand as soon as it allows that, and drive about.
 
-    It tries again and again, also while others drive the robot. Now and then the hand
-    rests, or lets go and takes it again at once.
+    It keeps trying, also while others drive the robot. Now and then the hand rests, or lets go
+    and takes the robot again at once.
     """
     hand = ManualControl(storm.robot(fault.target).agent)
     goes = [True]
@@ -298,18 +300,18 @@ def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _kill_dva(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Kill it before it hears what it waited for, or shortly after that."""
+    """Kill the DVA before it receives the awaited message, or shortly after."""
     after = chance.choice((0.0, 0.001, chance.uniform(0.0, 3.0)))
     storm.run.clock.call_after(after, storm.dva.kill, fault.value)
 
 
 def _kill_dva_writing(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Kill it between two writes of its memory: at which is drawn."""
+    """Kill the DVA at a random one of the next writes to its memory."""
     storm.dva.kill_at_write(chance.randrange(40), fault.value)
 
 
 def _fill_disk(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Let the DVA write nothing to its memory, and perhaps kill it meanwhile."""
+    """Let all writes of the DVA fail, and perhaps kill it meanwhile."""
     storm.dva.full += 1
     if fault.value:
         storm.run.clock.call_after(chance.random() * fault.for_s, storm.dva.kill, fault.value)
@@ -321,7 +323,7 @@ def _fill_disk(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _slow_dva(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Let each request wait until those before it have had so much of the DVA's time."""
+    """Delay requests as if each took the DVA the time of the fault's strength."""
     interference = storm.interference
     free_at = storm.now
 
@@ -363,7 +365,7 @@ def _vanish(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _idle(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Return a guard answers every order with OK, and does nothing."""
+    """Let a guard answer every order with OK, and do nothing."""
     node = storm.id_of(fault.target)
     network = storm.device(fault.target).network
     assert isinstance(network, VirtualNetwork)
@@ -378,7 +380,7 @@ def _restart_app(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 
 def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Send an emergency in whatever name, to whomever it is addressed, in any session."""
+    """Send an emergency under any name, addressed to any robot, in any session."""
     robot = storm.id_of(fault.target)
     if chance.random() < 0.4:
         storm.intruder.ask(robot, m.Emergency())
@@ -402,10 +404,10 @@ def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Give the robot to somebody else, unasked, who starts at once, and gives it back later."""
+    """Give the robot, unasked, to another driver, who may start at once and gives it back later."""
     robot = storm.id_of(fault.target)
     dva = storm.run.dva
-    if dva.is_gone:  # nobody is given anything by the dead
+    if dva.is_gone:  # a killed DVA grants nothing
         return
     drivers = [device for device in storm.labelled if device.startswith(DRIVERS)]
     taker = storm.device(chance.choice(sorted(drivers)))
@@ -426,9 +428,9 @@ def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Ask for a robot in the midst of whatever it does, more than once.
+    """Request a robot several times, whatever it is doing.
 
-    It gives back every permission that it gets, even one that it drives by.
+    The device gives back every permission that it gets, even the one by which it drives.
     """
     device = storm.device(fault.target)
     robot = chance.choice(storm.robots)
@@ -444,7 +446,7 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Act by sessions of before, or that never were, as an operator."""
+    """Act as an operator by former sessions, or by some that never existed."""
     device = storm.device(fault.target)
     robot = chance.choice(storm.robots)
     bodies: list[m.Body] = [m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp()]
@@ -456,7 +458,7 @@ def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 
 def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Return an intruder that is registered asks for the robot, and drives it as soon as it may."""
+    """Let a registered intruder request the robot, and drive it once it is granted."""
     return storm.intruder.drive(storm.id_of(fault.target), fault.value)
 
 
@@ -539,7 +541,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "messages-late": FaultKind(
-        "messages are late, by up to so many seconds",
+        "messages are late by up to N s",
         ANY_ROLE,
         _messages(i.delays),
         lasts=_LONG,
@@ -548,7 +550,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "messages-doubled": FaultKind(
-        "each message comes again, within so many seconds",
+        "each message arrives again within N s",
         ANY_ROLE,
         _messages(i.doubles),
         lasts=_LONG,
@@ -557,7 +559,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "messages-reordered": FaultKind(
-        "messages overtake each other, by up to so many seconds",
+        "messages overtake each other by up to N s",
         ANY_ROLE,
         _messages(i.reorders),
         lasts=_LONG,
@@ -587,7 +589,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "frozen": FaultKind(
-        "a process stands still: what comes and goes waits",
+        "a process stands still: its messages wait both ways",
         ANY_ROLE,
         _freeze,
         lasts=_SHORT,
@@ -595,7 +597,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=ON_DRIVING,
     ),
     "replay": FaultKind(
-        "so many of the last messages arrive again",
+        "N of the last messages arrive again",
         ANY_ROLE,
         _replay,
         value=(1.0, 64.0),
@@ -603,7 +605,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "order-again": FaultKind(
-        "the last orders to a robot arrive again, so many seconds after it was to stop",
+        "the last orders to a robot arrive again, N s after it was told to stop",
         ("robot",),
         _order_again,
         value=(2.0, 8.0),
@@ -611,14 +613,14 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=3.0,
     ),
     "replay-by-another": FaultKind(
-        "an intruder sends so many of the last messages again",
+        "an intruder repeats N of the last messages",
         ("robot", "dva"),
         _replay_by_another,
         value=(1.0, 64.0),
         on=ON_DRIVING,
     ),
     "junk": FaultKind(
-        "an intruder sends so many messages that are none",
+        "an intruder sends N invalid messages",
         ("robot", "dva"),
         _junk,
         value=(1.0, 100.0),
@@ -642,7 +644,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=ON_DRIVING,
     ),
     "robot-slow": FaultKind(
-        "a message takes a robot's computer so many seconds",
+        "a message takes a robot's computer N s",
         ("robot",),
         _slow,
         lasts=_LONG,
@@ -655,10 +657,12 @@ FAULTS: Final[dict[str, FaultKind]] = {
     "camera-lies": FaultKind(
         "a camera shows an old picture as new", ("",), _messages(i.freezes_pictures), lasts=_LONG
     ),
-    "sensor-lies": FaultKind("a sensor of a robot says anything", ("robot",), _lie, lasts=_LONG),
+    "sensor-lies": FaultKind(
+        "a sensor of a robot shows arbitrary values", ("robot",), _lie, lasts=_LONG
+    ),
     "clock-drifts": FaultKind("a robot's clock runs fast or slow", ("robot",), _drift, lasts=_LONG),
     "clock-jumps": FaultKind(
-        "a device's clock is set, by so many seconds",
+        "a device's clock is set by N s",
         ("robot", "operator", "driver", "guard"),
         _set_clock,
         value=(-4000.0, 4000.0),
@@ -671,7 +675,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=("StartTeleOp", "PermissionRevocation"),
     ),
     "dva-killed": FaultKind(
-        "the DVA is killed, and is back after so many seconds",
+        "the DVA is killed, and is back after N s",
         ("dva",),
         _kill_dva,
         value=(0.5, 40.0),
@@ -679,7 +683,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "dva-killed-writing": FaultKind(
-        "the DVA is killed between two writes, and is back after so many seconds",
+        "the DVA is killed between two writes, and is back after N s",
         ("dva",),
         _kill_dva_writing,
         value=(0.5, 20.0),
@@ -687,7 +691,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "disk-full": FaultKind("the DVA cannot write to its memory", ("dva",), _fill_disk, lasts=_LONG),
     "disk-full-and-killed": FaultKind(
-        "the DVA cannot write, is killed meanwhile, and is back after so many seconds",
+        "the DVA cannot write, is killed meanwhile, and is back after N s",
         ("dva",),
         _fill_disk,
         lasts=_LONG,
@@ -696,7 +700,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "dva-slow": FaultKind(
-        "a message takes the DVA so many seconds",
+        "a message takes the DVA N s",
         ("dva",),
         _slow_dva,
         lasts=_SHORT,
@@ -704,10 +708,10 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=("EventReport", "PermissionRequest", "GetGrant"),
     ),
     "dva-silent": FaultKind(
-        "the DVA says and decides nothing", ("dva",), _silence_dva, lasts=_LONG
+        "the DVA sends and decides nothing", ("dva",), _silence_dva, lasts=_LONG
     ),
     "vanishes": FaultKind(
-        "somebody is silent, and comes back",
+        "a device falls silent, and comes back",
         ("operator", "driver", "guard"),
         _vanish,
         lasts=_LONG,
@@ -715,7 +719,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "guard-idle": FaultKind(
-        "a guard says OK to every order, and does nothing",
+        "a guard answers OK to every order, and does nothing",
         ("guard",),
         _idle,
         lasts=(20.0, 120.0),
@@ -740,20 +744,20 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "the DVA gives a robot to somebody else", ("robot",), _take_over, on=DRIVEN, weight=2.0
     ),
     "asks-twice": FaultKind(
-        "an operator asks so many times for a robot", DRIVERS, _ask_twice, value=(1.0, 5.0)
+        "an operator requests a robot N times", DRIVERS, _ask_twice, value=(1.0, 5.0)
     ),
     "old-session": FaultKind(
         "an operator acts by an old session", DRIVERS, _old_session, weight=2.0
     ),
     "held-tilt": FaultKind(
-        "all commands say the same speed",
+        "all commands have the same speed, N m/s",
         ("",),
         _messages(i.holds_tilt),
         lasts=(10.0, 60.0),
         value=(0.1, 0.5),
     ),
     "second-driver": FaultKind(
-        "an intruder asks for a robot, and sends so many commands a second",
+        "an intruder requests a robot, and sends N commands a second",
         ("robot",),
         _second_driver,
         lasts=(5.0, 60.0),
@@ -762,35 +766,35 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "flood": FaultKind(
-        "an intruder sends so many requests a second",
+        "an intruder sends N requests a second",
         ("robot", "dva"),
         _flood,
         lasts=_SHORT,
         value=(20.0, 200.0),
     ),
     "flood-in-doubt": FaultKind(
-        "an intruder sends so many orders a second to a robot that the DVA does not hear",
+        "an intruder sends N orders a second to a robot whose questions do not reach the DVA",
         ("robot",),
         _flood_in_doubt,
         lasts=(3.0, 10.0),
         value=(50.0, 200.0),
     ),
     "event-anywhere": FaultKind(
-        "so many events are reported, in walls and elsewhere",
+        "N events are reported, in walls and elsewhere",
         ("",),
         _report,
         value=(1.0, 4.0),
     ),
     "event-doubled": FaultKind(
-        "one event is reported so many times", ("",), _report_twice, value=(2.0, 6.0)
+        "one event is reported N times", ("",), _report_twice, value=(2.0, 6.0)
     ),
     "event-taken-back": FaultKind(
-        "an event is taken back so many seconds after it was reported",
+        "a report is withdrawn N s after it was made",
         ("",),
         _take_back,
         value=(0.5, 40.0),
     ),
     "events-by-the-hundred": FaultKind(
-        "so many events are reported at once", ("",), _report, value=(100.0, 1000.0), weight=0.1
+        "N events are reported at once", ("",), _report, value=(100.0, 1000.0), weight=0.1
     ),
 }

@@ -1,4 +1,4 @@
-"""Interference with messages: what reaches a node late, twice, altered, or not at all."""
+"""Interference with messages, which arrive late, twice, altered, or not at all."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from dva_sim.network.virtual_network import Take
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode_if_valid, encode
 
-REMEMBERED = 64  # messages to a node that may be replayed: of those by the dozen, and of others
+REMEMBERED = 64  # latest messages to a node kept for replays, each of frequent and of other kinds
 FREQUENT_MESSAGES = b"<SetTeleOp", b"<HBMsg>", b"<RobotStatus>"
 
 
 class PassingMessage(NamedTuple):
-    """A message that is about to reach a node.
+    """Message that is about to reach a node.
 
     Attributes:
         source: Id of its sender.
         to: Id of its receiver.
         payload: Bytes, or a camera frame.
-        take: Hands a payload to the receiver, now.
+        take: Function that hands a payload to the receiver now.
     """
 
     source: str
@@ -34,20 +34,20 @@ class PassingMessage(NamedTuple):
 
 
 Rule = Callable[[PassingMessage], bool]
-"""Takes a message that is passing; True if nothing else is to happen to it."""
+"""Function applied to a passing message; True if nothing else is to happen to it."""
 
 
 class Interference:
-    """Lets each message pass, unless a rule that is in force says otherwise.
+    """Filter that lets each message pass, unless a rule in force decides otherwise.
 
     Args:
         clock: The run's clock.
-        watch: Called with each message that really reaches its receiver, and what takes it there.
+        watch: Callback for each message that reaches its receiver; it has to hand it over.
 
     Attributes:
-        rules: In force now, in the order in which they began.
+        rules: Rules in force now, in the order in which they began.
         counts: Messages that were interfered with, by kind of fault.
-        delivered: Number of messages that have reached somebody.
+        delivered: Number of messages that have reached a receiver.
     """
 
     def __init__(self, clock: Clock, watch: Callable[[PassingMessage], None]) -> None:
@@ -91,7 +91,7 @@ class Interference:
         Args:
             kind: Name of its element, such as `StartTeleOp`.
             to: Prefix of the receiver's id.
-            then: Called with the id of the receiver.
+            then: Callback with the id of the receiver.
         """
         self._awaited.append((b"<" + kind.encode(), to, then))
 
@@ -104,7 +104,7 @@ class Interference:
 
 
 Meddling = Callable[[Interference, PassingMessage], bool]
-"""Does something to a message that is passing; True if nothing else is to happen to it."""
+"""Function that alters the delivery of a message; True if nothing else is to happen to it."""
 
 
 # --- rules -------------------------------------------------------------------------------
@@ -116,7 +116,7 @@ def loses(share: float, chance: random.Random) -> Meddling:
 
 
 def delays(longest: float, chance: random.Random) -> Meddling:
-    """Delay each message by up to so much [s]; they overtake each other."""
+    """Delay each message by up to `longest` [s]; messages may overtake each other."""
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         interference.later(passing, longest * chance.random())
@@ -126,7 +126,7 @@ def delays(longest: float, chance: random.Random) -> Meddling:
 
 
 def doubles(longest: float, chance: random.Random) -> Meddling:
-    """Let each message pass, and a copy of it up to so much later [s]."""
+    """Let each message pass, and deliver a copy up to `longest` later [s]."""
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         interference.deliver(passing)
@@ -137,7 +137,7 @@ def doubles(longest: float, chance: random.Random) -> Meddling:
 
 
 def reorders(longest: float, chance: random.Random) -> Meddling:
-    """Hold back every second message, at random, by up to so much [s]."""
+    """Hold back half of the messages, at random, by up to `longest` [s]."""
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         if chance.random() < 0.5:
@@ -149,7 +149,7 @@ def reorders(longest: float, chance: random.Random) -> Meddling:
 
 
 def corrupts(share: float, chance: random.Random) -> Meddling:
-    """Alter a share of the messages: a byte is changed, lost, or another one inserted."""
+    """Alter a share of the messages: a byte is changed, removed or replaced by two."""
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         if not isinstance(passing.payload, bytes) or chance.random() >= share:
@@ -176,11 +176,11 @@ def loses_in_bursts(share: float, chance: random.Random) -> Meddling:
 
 
 def holds_tilt(speed: float, chance: random.Random) -> Meddling:
-    """Make all commands say the same, as of somebody who has put the phone aside.
+    """Make all commands equal, as if the driver had put the phone aside.
 
     Args:
         speed: Speed in the commands [m/s].
-        chance: Draws the turn rate.
+        chance: Random numbers from which the turn rate is drawn.
     """
     turn = chance.uniform(-0.5, 0.5)
 
@@ -198,7 +198,7 @@ def holds_tilt(speed: float, chance: random.Random) -> Meddling:
 
 
 def freezes_pictures(_: float, __: random.Random) -> Meddling:
-    """Show the first picture for ever, each time with the tick of the present one: a lie."""
+    """Repeat the first picture for ever, each time with the tick of the current one."""
     first_frames: dict[str, CameraFrame] = {}
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:

@@ -1,4 +1,4 @@
-"""A device that does what no honest one does: forges, floods, replays, drives beside the driver."""
+"""Dishonest device: it forges, floods, replays, and drives besides the driver."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.simulation.full.stage import DVA, Stage
 
-NUMBER = 900  # beyond all operators of a scenario
-BUSY_FOR = 2.0  # before the DVA is asked again [s]
+NUMBER = 900  # number of the first intruder, beyond all operators of a scenario
+BUSY_FOR = 2.0  # delay before a busy DVA is asked again [s]
 
 
 class Intruder:
-    """A device that says anything to anybody.
+    """Device that sends anything to anybody.
 
     Args:
         number: Number among the intruders.
@@ -33,14 +33,14 @@ class Intruder:
         self.ask = self.device.ask
 
     def send(self, to: str, data: bytes) -> None:
-        """Send bytes as a request, and care for no answer."""
+        """Send bytes as a request, and ignore the answer."""
         if to not in self._wires:
             node = self.device.id_tag
             self._wires[to] = self._network.connect(node, to, do_nothing, pipelined=True)
         self._wires[to].send(next(self._tags), data)
 
     def send_message(self, to: str, body: m.Body, session: int = 0) -> None:
-        """Send a request, and care for no answer."""
+        """Send a request, and ignore the answer."""
         now = self.device.clock.now
         self.send(to, encode(self.device.outbox.message(to, body, now, session)))
 
@@ -49,10 +49,10 @@ class Intruder:
         self.ask(DVA, m.EventReport(None, kind, place, 0.5, 0.9, "detected"))
 
     def drive(self, robot: str, rate: float) -> Callable[[], None]:
-        """Ask for a robot until it is granted, then drive it with so many commands a second.
+        """Request a robot until it is granted, then drive it at a rate of commands [Hz].
 
         Returns:
-            What ends that: it vanishes without giving anything back.
+            Function that ends the drive: the device vanishes without giving anything back.
         """
         sessions = list[int]()
         goes = [True]
@@ -84,7 +84,7 @@ class Intruder:
 
 
 def give_back(device: AgentDevice, held: m.PermissionRevocation, after: float = 0.0) -> None:
-    """Let a device give a permission back after some time [s], until the DVA has kept that."""
+    """Let a device give a permission back after a time [s], until the DVA has saved that."""
 
     def answered(reply: m.Reply) -> None:
         if reply.code == m.BUSY:

@@ -1,4 +1,4 @@
-"""The plan of a storm: a scenario, and the faults that strike it, each with its time.
+"""Plan of a storm: a scenario, and the faults that strike it, each with its time.
 
 A plan is data. It can be written to a file, cut down to fewer faults, and run again.
 """
@@ -21,11 +21,11 @@ from dva_sim.storms.releaser import LABEL as RELEASER
 from dva_sim.storms.releaser import ROLE as RELEASER_ROLE
 
 RECOVERS_WITHIN: Final = 120.0
-"""From the end of the last fault to the probes that must succeed (S8) [s].
+"""Time from the end of the last fault to the probes that must succeed (S8) [s].
 
-A request fails after three attempts of 9 s. Who cannot register asks again every 2 s, who can every
-10 s; the DVA calls somebody silent after 10 s, and forgets a permission with them. Four of these
-chains follow each other where a robot has just been restarted under a driver.
+A request fails after three attempts of 9 s. A device that cannot register retries every 2 s, and
+one that can renews every 10 s; after 10 s of silence the DVA ends a device's permissions. Four of
+these chains follow each other if a robot has just been restarted under its driver.
 """
 PROBES_LAST: Final = 120.0
 """Longest time of a probe, from the first request to its end [s]."""
@@ -33,18 +33,18 @@ PROBES_LAST: Final = 120.0
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong.
+    """One fault of a storm.
 
     Attributes:
         kind: Its name, as in `dva_sim.storms.faults.FAULTS`.
         at_s: Earliest start [s].
         for_s: Duration [s]; 0: a single act.
         target: Label of the device that it strikes, such as `robot-1`; empty: any; `robot-*`: the
-            robot that the message is for which it waits.
+            robot that receives the awaited message.
         source: Label of the sender, for faults of messages; empty: any.
-        on: Waits for the first message of this kind to the target, such as `StartTeleOp`; empty:
-            it begins at `at_s`.
-        value: Its strength; each kind says what that is.
+        on: Kind of message to the target that it waits for, such as `StartTeleOp`; empty: it
+            begins at `at_s`.
+        value: Its strength, whose meaning depends on the kind.
     """
 
     kind: str
@@ -56,21 +56,21 @@ class Fault:
     value: float = 0.0
 
     def as_plain(self) -> dict[str, Any]:
-        """Return it for a file, without what is as usual."""
+        """Return it for a file, without default values."""
         usual = {field.name: field.default for field in fields(self)}
         return {key: value for key, value in asdict(self).items() if value != usual[key]}
 
 
 @dataclass(frozen=True)
 class StormPlan:
-    """A storm.
+    """Storm: a scenario and its faults.
 
     Attributes:
         seed: Random seed.
         scenario: Keys of a scenario, as in its file.
-        faults: In order of time.
+        faults: Faults in order of time.
         calm_s: End of the last fault [s]; from then on everything has to recover.
-        drivers: Number of drivers who are never idle, beside the operators of the scenario.
+        drivers: Number of drivers who are never idle, besides the operators of the scenario.
     """
 
     seed: int
@@ -81,7 +81,7 @@ class StormPlan:
 
     @property
     def horizon_s(self) -> float:
-        """End of the storm, after recovery and probes [s]; it lasts longer where these are late."""
+        """End of the storm, after recovery and probes [s]; late probes prolong it."""
         return self.calm_s + RECOVERS_WITHIN + PROBES_LAST
 
     def built(self) -> Scenario:

@@ -1,10 +1,10 @@
-"""S8: when faults cease, everything recovers within a stated time, shown by doing it.
+"""S8: after the faults everything recovers within a stated time, shown by using it.
 
-Some time after the last fault somebody new does what anybody could do before: reports an event,
-asks for each robot in turn, drives it, stops it by an emergency; a person who may releases it, and
-it is sent out and called back;
-and the DVA lists everybody, for a while, and hears the heartbeats of everybody. What does not
-succeed has not recovered. Nobody is asked how it is.
+Some time after the last fault a new device does what any device could do before: it reports an
+event, requests each robot in turn, drives it, and stops it by an emergency; a permitted person
+releases the robot, and it is sent out and called back. For a while the DVA must list all devices
+and receive their heartbeats. Whatever does not succeed has not recovered; no component is asked
+about its state.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from dva_sim.storms.plan import PROBES_LAST, RECOVERS_WITHIN
 from dva_sim.storms.releaser import Releaser
 
 RETRY_DELAY_S = 1.0  # between two attempts of a probe [s]
-USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
-STOPPED_AFTER = 5.0  # an emergency was answered [s]
-LISTED = 30  # times without a break that the DVA has to list everybody, a second apart
+USED_LATELY = 30.0  # a robot that obeyed a device this recently needs no probe [s]
+STOPPED_AFTER = 5.0  # time from the reply to an emergency until the robot must stand [s]
+LISTED = 30  # complete device lists in a row, a second apart, that the DVA has to give
 LIST = "the list"
-BEATS_WITHIN = 30.0  # of the end the DVA has heard the heartbeat of everybody [s]
-BYSTANDER = NUMBER + 50
+BEATS_WITHIN = 30.0  # time before the end within which each device's heartbeat must arrive [s]
+BYSTANDER = NUMBER + 50  # number of the probing device, beyond those of all others
 
 
 class RecoveryProbes:
-    """Probes whether everything works again.
+    """Probes of whether everything works again.
 
     Args:
         recorder: Recorder of what has not recovered.
@@ -84,14 +84,14 @@ class RecoveryProbes:
             self._clock.call_at(begins, self._ask_for, robot)
 
     def accepted(self, command: Accepted) -> None:
-        """Note that a robot obeys somebody."""
+        """Note that a robot obeys a command."""
         self._used[command.robot] = command.time
         if command.source == self._probe.device.id_tag and command.robot in self._open:
             self._open[command.robot] = "does not answer an emergency"
             self._stop(command.robot)
 
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
-        """Note which robots go somewhere."""
+        """Note which robots are moving."""
         for robot, motion in motions.items():
             if motion.speed > MOVING:
                 self._used[robot] = now
@@ -104,14 +104,14 @@ class RecoveryProbes:
     def due(self) -> float:
         """Return when the last probe must have succeeded [s].
 
-        A robot that its holder kept until then is granted late: its probe takes as long as any.
+        A robot that its holder kept until then is granted late, and its probe then takes its time.
         """
         begins = self._calm + RECOVERS_WITHIN
         late = max((self._granted.get(device, begins) for device in self._open), default=begins)
         return min(late, begins + PROBES_LAST) + PROBES_LAST
 
     def end(self) -> None:
-        """Tell what has not recovered."""
+        """Report what has not recovered."""
         for device, when in self._beats.items():
             if self._clock.now - when > BEATS_WITHIN:
                 text = f"has not heard the heartbeat of {self._stage.labels[device]}"
@@ -125,7 +125,7 @@ class RecoveryProbes:
             self._recorder.violated("S8", self._clock.now, label, text)
 
     def _list(self, expected: frozenset[str]) -> None:
-        """Have everybody listed often enough without a break."""
+        """Ask for the device list until it was complete often enough in a row."""
 
         def again() -> None:
             self._clock.call_after(RETRY_DELAY_S, self._list, expected)
@@ -158,10 +158,10 @@ class RecoveryProbes:
         self._probe.ask(DVA, body, answered, again)
 
     def _ask_for(self, robot: str) -> None:
-        """Ask for a robot until it is granted; one that others drive works, and is left to them.
+        """Request a robot until it is granted; a robot that others drive works and is left alone.
 
-        Its holder is asked, too: a DVA that could not write before it was killed may remember a
-        permission whose holder has been told that it is over, and does not use it.
+        The request asks the holder to give it up: a DVA that could not write before it was killed
+        may remember a permission whose holder knows that it is over, and does not use it.
         """
         if robot not in self._open:
             return
@@ -199,7 +199,7 @@ class RecoveryProbes:
         self._probe.ask(robot, m.StartTeleOp(), answered, again, session)
 
     def _drive(self, robot: str, session: int) -> None:
-        """Command until it obeys; a drive that ended before its start was answered begins again."""
+        """Send commands until the robot obeys; start again if the drive has ended meanwhile."""
         waits = "obeys no command of its driver"
         self._session[robot] = session
         if self._open.get(robot) != waits:
@@ -244,7 +244,7 @@ class RecoveryProbes:
         self._releaser.release(robot, answered, again)
 
     def _send_out(self, robot: str) -> None:
-        """Send a robot on a mission, and call it back; a permission that was lost is asked for."""
+        """Send a robot on a mission, and call it back; request a lost permission again."""
         session = self._session[robot]
 
         def again(*_: object) -> None:

@@ -1,7 +1,7 @@
-"""A storm of several DVAs: deaths, partitions and bad links between DVAs, and what breaks.
+"""Storm of several DVAs: kills, partitions and bad links between them, and the verdict.
 
-It is smaller than a storm of one team: what it strikes is what DVAs say to each other and to
-their devices. S1 to S7 and S12 to S15 are judged as in any run, and S8 at the end.
+It is smaller than a storm of one team: it strikes messages among DVAs and to their devices. S1 to
+S7 and S12 to S15 are judged as in any run, and S8 at the end.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from dva_sim.storms.interference import Interference, PassingMessage
 from dva_sim.storms.outcome import StormOutcome
 from dva_sim.storms.plan import Fault, StormPlan
 
-CALM: Final = 240.0  # faults have ended [s]
-LASTS: Final = 120.0  # from then to the end [s]
-FIRST: Final = 10.0  # faults begin [s]
+CALM: Final = 240.0  # end of the last fault [s]
+LASTS: Final = 120.0  # time from then to the end of the storm [s]
+FIRST: Final = 10.0  # earliest start of a fault [s]
 KILLED: Final = "region-killed"
-ASKS_AFTER: Final = 3.0  # from the registration of the supervisor [s]
+ASKS_AFTER: Final = 3.0  # time from the supervisor's registration to its request [s]
 REGION_ALONE: Final = "region-alone"  # a DVA reaches detectors and nobody else
-RETURNED: Final = "region-given-back"  # a supervisor says so
+RETURNED: Final = "region-given-back"  # a supervisor requests it
 KINDS: Final = (
     KILLED,
     REGION_ALONE,
@@ -115,7 +115,7 @@ def _fault(chance: random.Random, dvas: list[str], devices: list[str]) -> Fault:
 
 
 class RegionalStorm:
-    """A run of several DVAs that a plan's faults strike.
+    """Run of several DVAs that a plan's faults strike.
 
     Args:
         plan: The storm.
@@ -150,7 +150,7 @@ class RegionalStorm:
         return self.run.clock.now
 
     def id_of(self, label: str) -> str:
-        """Return the id of a device by its label; of none, none."""
+        """Return the id of a device by its label; an empty label has none."""
         labels = self.run.stage.labels
         return (
             next(id_tag for id_tag, device_label in labels.items() if device_label == label)
@@ -162,7 +162,7 @@ class RegionalStorm:
         """Let the storm pass, and judge it.
 
         Args:
-            enough: Returns True once a broken rule need not be waited for any longer.
+            enough: Function that returns True once a broken rule ends the storm.
         """
         began = time.process_time()
         end = self.plan.calm_s + LASTS
@@ -210,7 +210,7 @@ class RegionalStorm:
             clock.call_after(fault.for_s, ends)
 
     def _give_back(self, region: str) -> None:
-        """Let the supervisor go to the DVA that serves a region, and ask it to give that back."""
+        """Let the supervisor register with the DVA that serves a region, and ask for its return."""
         supervisor = self._supervisor
         there = (dva for dva in self.run.dvas.values() if not dva.is_gone)
         serves = next((dva for dva in there if region in page_of(dva).served), None)
@@ -220,7 +220,7 @@ class RegionalStorm:
             self.run.clock.call_after(ASKS_AFTER, supervisor.ask, serves.device.id_tag, ask)
 
     def _cut_off(self, dva: str) -> Callable[[], object]:
-        """Cut a DVA off from all but detectors, both ways; return what ends that."""
+        """Cut a DVA off from all but detectors, both ways; return a function that ends that."""
         detectors = id_of("detector", 1)[: len("02:00:00:04")]
         rules = self.interference.rules
 
@@ -234,7 +234,7 @@ class RegionalStorm:
         return lambda: rules.remove(meets)
 
     def _judge_recovery(self) -> None:
-        """Tell what has not recovered (S8): a region without a DVA, a device that is nobody's."""
+        """Report what has not recovered (S8): regions without one DVA, devices without any."""
         run = self.run
         served = [region for dva in run.dvas.values() for region in page_of(dva).served]
         for region in run.scenario.dva.regions:

@@ -1,4 +1,4 @@
-"""A person in a storm who releases robots after emergencies, some time after each."""
+"""Person in a storm who releases robots some time after each emergency."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from dva_sim.simulation.full.stage import Stage
 NUMBER: Final = 2
 LABEL: Final = f"control-room-{NUMBER}"
 ROLE: Final = "dispatch"
-THINKS_S: Final = 1.0, 20.0  # from the first news of an emergency to its release
-LOOKS_AGAIN_S: Final = 15.0  # whether a robot goes on that the DVA has let go
+THINKS_S: Final = 1.0, 20.0  # shortest and longest time from an emergency to its release [s]
+LOOKS_AGAIN_S: Final = 15.0  # time after which a robot that is still held is released again [s]
 
 
 class Releaser:
-    """A control room that hears of emergencies from the robots, and releases them.
+    """Control room that hears of emergencies from the robots, and releases them.
 
     Args:
         stage: Stage of the run.
@@ -63,7 +63,7 @@ class Releaser:
             )
 
     def _decide(self, robot: str, tick: int) -> None:
-        """Release a robot; it is decided on again if that was lost, with or without a word."""
+        """Release a robot; if the release gets lost, the next report is decided on again."""
 
         def forget() -> None:
             if self._decided.get(robot) == tick:
@@ -72,7 +72,7 @@ class Releaser:
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
                 forget()
-            else:  # a DVA that is killed before it can write forgets it
+            else:  # a DVA killed before it can write forgets the release
                 self.room.device.clock.call_after(LOOKS_AGAIN_S, forget)
 
         if self._decided.get(robot) == tick:

@@ -32,15 +32,15 @@ from dva_sim.storms.releaser import Releaser
 
 
 class Killed(BaseException):
-    """The process of the DVA ends here; nothing of what it was about to do happens."""
+    """End of the DVA's process: nothing of what it was about to do happens."""
 
 
 class DvaLives:
-    """Kills and restarts the DVA of a run, and fills the disk that its memory is on.
+    """Lives of the DVA of a run: kills, restarts, and a full disk under its memory.
 
     Args:
-        file: Its memory.
-        down: Called with True when it is killed, and with False when it is back.
+        file: File of its memory.
+        down: Callback with True when it is killed, and with False when it is back.
 
     Attributes:
         memory: Memory since the last restart.
@@ -99,7 +99,7 @@ class DvaLives:
         run.clock.call_after(away, self._back)
 
     def kill_at_write(self, number: int, away: float) -> None:
-        """Kill the DVA at one of its next writes, of which nothing is kept."""
+        """Kill the DVA at one of its next writes, which is lost."""
         self._writes_left = number
         self._away = away
 
@@ -126,12 +126,12 @@ class DvaLives:
         self._down(False)
 
 
-FLOODER = NUMBER + 1  # holds nothing, ever
-FITS = 0.8  # around a place to which robots are sent [m]
+FLOODER = NUMBER + 1  # number of the flooding intruder, which never holds a robot
+FITS = 0.8  # free space around a place to which robots are sent [m]
 
 
 class StormRobot(NamedTuple):
-    """A robot of a storm."""
+    """Robot of a storm, with its faults."""
 
     id: str
     agent: RobotAgent
@@ -149,14 +149,14 @@ class StormScene:
         run: The run.
         recorder: Recorder of the run.
         interference: Control over the delivery of messages.
-        intruder: Does what no honest device does.
-        flooder: Sends more than anybody can take, and is given nothing.
-        releaser: Releases robots after emergencies.
-        dva: Kills and restarts the DVA.
+        intruder: Dishonest device.
+        flooder: Device that sends more than any other can process, and holds nothing.
+        releaser: Person who releases robots after emergencies.
+        dva: Kills and restarts of the DVA.
         robots: All robots.
         guards: Ids of the guards.
         operators: Ids of the operators of the scenario.
-        drivers: Those who always drive, by label.
+        drivers: Drivers that are never idle, by label.
         labelled: Ids by label.
     """
 
@@ -207,7 +207,7 @@ class StormScene:
         passing.take(passing.payload)
 
     def answered(self, node: str, to: str, reply: bytes) -> None:
-        """Tell the audit what a node has answered, even if there is nobody who hears it."""
+        """Pass an answer of a node to the audit, even if it reaches nobody."""
         self.run.audit.sent(self.now, node, to, reply)
 
     def dva_is_down(self, is_down: bool) -> None:
@@ -222,7 +222,7 @@ class StormScene:
         return self.run.clock.now
 
     def id_of(self, label: str) -> str:
-        """Return the id of a device by its label; of none, none."""
+        """Return the id of a device by its label; an empty label has none."""
         return self.labelled[label] if label else ""
 
     def robot(self, label: str) -> StormRobot:

@@ -1,4 +1,4 @@
-"""Cuts a storm that breaks a rule down to what breaks it: fewer faults, fewer agents, no link."""
+"""Reduction of a storm that breaks a rule to fewer faults, fewer agents and a plainer link."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.storm import play
 
 TRIES: Final = 120
-"""So many smaller storms are tried at most."""
+"""Maximum number of smaller storms that are tried."""
 _PLAINER: Final[tuple[tuple[str, Any], ...]] = (
     ("link", {"delay_s": 0.05}),
     ("site", {"name": "caparica"}),
@@ -22,16 +22,16 @@ _PLAINER: Final[tuple[tuple[str, Any], ...]] = (
     ("pattern", "latest-wins"),
     ("dva", {}),
 )
-"""Parts of a scenario, and what is plainer than anything else there."""
+"""Parts of a scenario, and the plainest value of each."""
 
 
 class Shrinker:
-    """Looks for the smallest storm that fails as a given one does.
+    """Search for the smallest storm that fails in the same way as another.
 
     Args:
-        plan: A storm that fails.
-        outcome: Failure of the given storm.
-        before: Called with each storm before it begins.
+        plan: Storm that fails.
+        outcome: Its failure.
+        before: Callback with each storm before it begins.
         tries: Maximum number of storms to run.
 
     Attributes:
@@ -72,7 +72,7 @@ class Shrinker:
         try:
             outcome = self._play(plan)
         except ConfigError:
-            return False  # nobody is left to act, for example
+            return False  # for example, no device is left to act
         if not outcome.signature & self._wanted:
             return False
         self.plan = plan
@@ -132,6 +132,6 @@ class Shrinker:
 
 
 def _without(plan: StormPlan, size: int) -> Iterator[tuple[Fault, ...]]:
-    """Yield the faults without so many neighbours, from each place."""
+    """Yield the faults without `size` neighbours, for each block of them."""
     for first in range(0, len(plan.faults), size):
         yield plan.faults[:first] + plan.faults[first + size :]

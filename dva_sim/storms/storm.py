@@ -1,4 +1,4 @@
-"""One storm: a run in virtual time, its faults, and what the checkers find."""
+"""Storm: a run in virtual time, its faults, and the verdicts of the checkers."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from dva_sim.storms.recovery import RecoveryProbes
 from dva_sim.storms.regional_storm import RegionalStorm
 from dva_sim.storms.scene import StormScene
 
-LOOK_AT_BOUNDS = 30.0  # how often all containers are counted [s]
+LOOK_AT_BOUNDS = 30.0  # interval at which all containers are counted [s]
 HEARTBEAT = b"<HBMsg>"
-QUIET = HEARTBEAT, b"<RobotStatus>"  # of messages that only say that somebody is there
+QUIET = HEARTBEAT, b"<RobotStatus>"  # messages that only show that a device is present
 SILENCED = frozenset(
     {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}
     | {"dva-silent", "messages-lost", "partition", "frozen"}
 )
-"""Faults after which what was asked may stay without an answer."""
+"""Faults after which requests may stay unanswered."""
 
 
 class Storm(StormScene):
@@ -83,7 +83,7 @@ class Storm(StormScene):
         """Let the storm pass, and judge it.
 
         Args:
-            enough: Returns True once a broken rule need not be waited for any longer.
+            enough: Function that returns True once a broken rule ends the storm.
         """
         began = time.process_time()
         now = 0.0
@@ -112,7 +112,7 @@ class Storm(StormScene):
         if not fault.on:
             self._begin(fault)
             return
-        # What never comes is not waited for beyond the storm.
+        # A message that never comes is awaited no longer than the storm lasts.
         waits = [True]
         kind = fault.target.partition("-*")[0]
         is_any = fault.target.endswith("-*")
@@ -136,9 +136,11 @@ class Storm(StormScene):
             self._excuse(node, True)
         ends = FAULTS[fault.kind].begin(self, fault, _chance(self.plan, fault))
         if ends is not None:
+            # Containers are counted right before the end, when they are fullest.
             self.run.clock.call_after(fault.for_s, self._look_at_bounds)
             self.run.clock.call_after(fault.for_s, ends)
         if is_silenced:
+            # A second later: what was under way when the fault ended may be lost with it.
             self.run.clock.call_after(fault.for_s + 1.0, self._excuse, node, False)
 
     def _excuse(self, node: str, excused: bool) -> None:
@@ -210,7 +212,7 @@ class Storm(StormScene):
 
 
 class _Witness:
-    """Passes on what a storm has to know; see `Observer`."""
+    """Observer that passes on what a storm has to know; see `Observer`."""
 
     def __init__(self, storm: Storm) -> None:
         self.sent = storm.sent
@@ -224,7 +226,7 @@ class _Witness:
 
 
 def _chance(plan: StormPlan, fault: Fault | None = None) -> random.Random:
-    """Return the chance of one fault: the same whatever other faults there are."""
+    """Return the random numbers of one fault, the same whatever other faults there are."""
     return random.Random(f"{plan.seed} {fault!r}")
 
 
@@ -237,7 +239,7 @@ def play(
 
     Args:
         plan: The storm.
-        before: Called with the storm before it begins.
+        before: Callback with the storm before it begins.
         enough: See `Storm.play`.
     """
     with tempfile.TemporaryDirectory(prefix="dva-storm-") as folder:
