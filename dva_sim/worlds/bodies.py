@@ -1,4 +1,4 @@
-"""Contacts, jams and how they end: the rules, and what counts them.
+"""Contacts and jams of bodies: the rules, their counters, and the bodies themselves.
 
 Robots have no reverse: one that has driven into something has to turn away from it, or waits
 for help. The rules:
@@ -7,19 +7,19 @@ for help. The rules:
   nothing for `SAME_CONTACT`. A scrape along a ragged wall is one contact, however many segments
   it has, and so is a push during which both sides part for a moment. Contacts with people are
   counted among all, and once more by themselves.
-- **Jammed** is a robot that touches something, has been asked to drive or turn for `JAM_TIME`
-  altogether, and in all that time moved less than `JAM_WAY` and turned less than `JAM_TURN`
-  from where it was. Time in which nothing is asked of it does not count, and resets nothing.
-  A robot without power is asked for nothing: it fails, but it is not jammed.
-- **It recovers** by turning on the spot, where its drive can, until the way ahead is free, and
-  then driving on; or by being pushed. As soon as it has moved `JAM_WAY` or turned `JAM_TURN` it
-  is no longer jammed. A car cannot turn without moving ahead: one whose nose touches a wall
-  stays jammed.
-- **Who may free it**: only somebody beside it. In a run nobody does: a jam of a car ends what
-  it was sent to do, and is counted as the cause.
+- **A jam**: a robot touches something, was commanded to drive or turn for `JAM_TIME` in all, and
+  in that time moved less than `JAM_WAY` and turned less than `JAM_TURN`. Time without a command
+  does not count, and resets nothing. A robot without power gets no commands: it fails, but it is
+  not jammed.
+- **Recovery**: the robot turns on the spot, if its drive can, until the path ahead is free, and
+  drives on; or it is pushed. As soon as it has moved `JAM_WAY` or turned `JAM_TURN` it is no
+  longer jammed. A car cannot turn without moving ahead: one whose nose touches a wall stays
+  jammed.
+- **Help**: only a person beside it can free it. In a run nobody does: a jam ends a car's task, and
+  is counted as the cause.
 
-Below that stand what all bodies have in common that move (pymunk), and a robot's: motors push it,
-wheels hold it as well as the floor lets them.
+The second part holds what moving bodies have in common (pymunk), and the body of a robot: motors
+push it, and wheels hold it as far as the grip of the floor allows.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose, make_pose
 
 SAME_CONTACT: Final = 0.5  # touching again within this time is the same contact [s]
-JAM_TIME: Final = 5.0  # asked to move for so long, in contact [s]; assumed
-JAM_WAY: Final = 0.05  # [m]; assumed
-JAM_TURN: Final = 0.1  # [rad]; assumed
+JAM_TIME: Final = 5.0  # time of requested motion in contact that counts as a jam [s]; assumed
+JAM_WAY: Final = 0.05  # distance below which the body has not moved [m]; assumed
+JAM_TURN: Final = 0.1  # turn below which it has not turned [rad]; assumed
 
 
 class Contacts:
@@ -100,16 +100,16 @@ class Jam:
 
 
 US: Final = 1_000_000
-G: Final = 9.81  # [m/s^2]
+G: Final = 9.81  # acceleration of gravity [m/s^2]
 GRIP: Final = 0.8  # friction coefficient of rubber on a dry floor
-FRICTION = 0.3  # of bumpers and walls; both multiply in a contact
-ELASTICITY = 0.1  # of bumpers and walls; both multiply in a contact
-BRAKES_BELOW = 1e-3  # slower than this, brakes hold [m/s, rad/s]
+FRICTION = 0.3  # coefficient of bumpers and of walls; both multiply in a contact
+ELASTICITY = 0.1  # coefficient of bumpers and of walls; both multiply in a contact
+BRAKES_BELOW = 1e-3  # brakes hold a slower body [m/s, rad/s]
 WALL = 1  # collision type
 ROBOT = 2  # collision type
 PERSON = 3  # collision type
 
-# An assignment to an attribute of pymunk's costs twice as much as the function behind it.
+# Assigning to an attribute of pymunk costs twice as much as calling the function behind it.
 _set_force: Callable[[pymunk.Body, tuple[float, float]], None] = pymunk.Body.force.fset  # type: ignore[attr-defined]
 _set_torque: Callable[[pymunk.Body, float], None] = pymunk.Body.torque.fset  # type: ignore[attr-defined]
 
@@ -117,9 +117,9 @@ T = TypeVar("T")
 
 
 class AskedFor(Generic[T]):
-    """Requests to a body: the one that holds now, and those of later ticks.
+    """Commands to a body: the one in force, and those of later ticks.
 
-    The first request still has its tick, however soon a newer one follows.
+    A command still acts in its tick, however soon a newer one follows.
 
     Args:
         first: Initial request.
@@ -136,7 +136,7 @@ class AskedFor(Generic[T]):
         self.coming: deque[tuple[int, T]] = deque()
 
     def put(self, start: int, what: T) -> None:
-        """Put a motion from tick `start` on; starts never go back."""
+        """Set the motion from tick `start` on; starts never go back."""
         if self.coming and self.coming[-1][0] == start:
             self.coming.pop()
         self.coming.append((start, what))
@@ -155,7 +155,7 @@ class AskedFor(Generic[T]):
 
 
 class Ticks:
-    """A space stepped in whole ticks up to when somebody looks.
+    """Space that is stepped in whole ticks, only when its state is needed.
 
     A standing body without requests sleeps: it costs nothing until requested or touched.
 
@@ -172,10 +172,11 @@ class Ticks:
         self._tick_us = round(dt * US)
         self._tick = 0
         self._now_us = 0
+        # Ordered, since the order of forces must be the same in each process.
         self._awake: dict[Body, None] = {}  # a set that keeps its order
 
     def wake(self, body: Body) -> None:
-        """Wake a body that was asked for something, or touched: it is pushed from the next tick."""
+        """Wake a body with a new command or contact: it is pushed from the next tick on."""
         self._awake[body] = None
 
     def forget(self, body: Body) -> None:
@@ -254,7 +255,7 @@ class Body:
 
     @property
     def velocity(self) -> tuple[float, float]:
-        """Along x and y [m/s]."""
+        """Velocity along x and y [m/s]."""
         velocity = self.body.velocity
         return velocity.x, velocity.y
 
@@ -298,8 +299,8 @@ class Body:
             self.impulse += impulse
 
 
-REST: Final = 8.0  # time constants after which nothing is left of a speed of 1 m/s
-TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assumed
+REST: Final = 8.0  # time constants after which nothing remains of a speed of 1 m/s
+TRACK: Final = 0.5  # distance of the wheels from the middle, as a share of the radius; assumed
 
 
 class TickTarget(NamedTuple):
@@ -317,10 +318,10 @@ STOP = TickTarget(0.0, 0.0, math.inf)
 
 
 class Lock:
-    """Wheels that are locked: the floor holds them along, across and turning, up to its grip.
+    """Locked wheels: the floor holds them along, across and against turning, up to its grip.
 
-    Friction is solved together with contacts, as forces from one tick to the next would let
-    a robot that is leant against creep away. Nothing draws the body back to where it was.
+    Friction is solved together with contacts: forces from one tick to the next would let a robot
+    creep that others lean against. Nothing pulls the body back to where it was.
 
     Args:
         space: Space of the body.

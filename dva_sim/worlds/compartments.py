@@ -20,11 +20,11 @@ Labels = NDArray[np.int16]
 
 NO_COMPARTMENT = -1  # label of cells in no compartment
 BLOCK = 8.0  # side of a block of a bare map's floor [m]
-MAX_BLOCKS = 2000  # on a larger floor they are larger
-MAX_PIECES = 4000  # of a floor in its blocks: each is compared with each
-MIN_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
-MIN_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
-TOUCHING_M = 0.05  # rooms this near to each other touch [m]
+MAX_BLOCKS = 2000  # maximum blocks; a larger floor has larger ones
+MAX_PIECES = 4000  # maximum pieces of a floor: each is compared with each
+MIN_BLOCK = 4.0  # area below which a piece joins its neighbour [m^2]
+MIN_BORDER = 0.3  # shorter openings without a wall are drawing errors [m]
+TOUCHING_M = 0.05  # rooms this near each other count as touching [m]
 
 
 class FloorPartition(NamedTuple):

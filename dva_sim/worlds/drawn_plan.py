@@ -28,11 +28,11 @@ from dva_sim.worlds.site_parts import (
 )
 
 DOOR_REACH = 0.15  # a door opens walls this near to its line [m]
-SILL = 0.5  # floor on both sides of a door, in case the rooms drawn do not meet [m]
-MIN_EXIT = 0.5  # [m]
-MIN_HOLE = 1e-4  # a smaller one comes from lines that do not quite meet [m^2]
-NEAR_RIM = 1e-3  # of a hole [m]
-NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
+SILL = 0.5  # floor added on both sides of a door, in case the drawn rooms do not meet [m]
+MIN_EXIT = 0.5  # minimum width of an exit [m]
+MIN_HOLE = 1e-4  # smaller holes come from lines that do not quite meet [m^2]
+NEAR_RIM = 1e-3  # distance that counts as on the rim of a hole [m]
+NOTHING = 2  # rank of no area, after rooms (0) and ground outdoors (1)
 GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
 
 

@@ -1,7 +1,7 @@
-"""Motor models: from wanted and measured motion to accelerations, without a clock.
+"""Motor models: from wanted and measured motion to accelerations; pure.
 
-A drive is one class, shipped or in a file of the user. It never sees the world: friction with
-the floor, walls and other bodies come on top of what it asks for.
+A drive is a class, shipped or in a file of the user. It does not see the world: friction with the
+floor, walls and other bodies act in addition.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any, Final
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import Guard, Plugins
 
-MAX_TICK: Final = 0.04  # that profiles are made for [s]
-CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
+MAX_TICK: Final = 0.04  # longest tick for which profiles are made [s]
+CREEP: Final = 0.01  # a slower car stands, and its steering has no effect [m/s]
 
 
 class Drive:
@@ -51,17 +51,17 @@ class Drive:
         """Return the accelerations of a tick: along [m/s^2] and turning [rad/s^2].
 
         Args:
-            speed: Wanted [m/s].
-            turn_rate: Wanted [rad/s].
-            now_speed: Measured along the heading [m/s].
-            now_turn_rate: Measured [rad/s].
+            speed: Wanted speed [m/s].
+            turn_rate: Wanted turn rate [rad/s].
+            now_speed: Measured speed along the heading [m/s].
+            now_turn_rate: Measured turn rate [rad/s].
             dt: Length of the tick [s].
         """
         raise NotImplementedError
 
 
 class Differential(Drive):
-    """Two driven wheels: speed and turn rate follow each with one time constant, limited."""
+    """Drive by two wheels: speed and turn rate each follow with a time constant, limited."""
 
     def __init__(self, spec: DriveSpec) -> None:
         super().__init__(spec)
@@ -73,7 +73,8 @@ class Differential(Drive):
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """Return the first order towards what is wanted, within the limits of acceleration."""
+        """Return first-order accelerations towards the wanted motion, within their limits."""
+        # A time constant below a tick would overshoot the target.
         gain = 1.0 / (self._time if self._time > dt else dt)
         along = (speed - now_speed) * gain
         turn = (turn_rate - now_turn_rate) * gain
@@ -85,21 +86,21 @@ class Differential(Drive):
 
 
 class ThreeWay(Drive):
-    """A model car: the motor by duty, steering that knows only left, straight and right.
+    """Drive of a model car: its motor has a duty, its steering only left, straight and right.
 
-    The car follows its front wheels: turn rate = speed / radius, either way or not at all, so it
-    cannot turn on the spot. A wish for a speed and a turn rate is met so:
+    The car follows its front wheels: turn rate = speed / radius to either side, or zero, so it
+    cannot turn on the spot. A wanted speed and turn rate are met as follows:
 
     - the speed is given to the motor as a whole percentage of the top speed;
-    - the steering goes to the side whose curvature is nearest to turn rate / speed: to a side
-      from half its curvature on, else straight;
-    - a turn rate at no speed moves nothing.
+    - the steering takes the position whose curvature is nearest to turn rate / speed: a side from
+      half its curvature on, otherwise straight;
+    - a turn rate without a speed has no effect.
 
     Args:
         spec: Mass, size and limits of the car.
-        wheelbase_m: From axle to axle [m].
+        wheelbase_m: Distance between the axles [m].
         steering_deg: Angle of the front wheels at either side [deg].
-        servo_s: Time from straight to a side [s].
+        servo_s: Time of the steering from straight to a side [s].
 
     References:
         R. Rajamani: Vehicle Dynamics and Control, 2nd ed., Springer 2012, chapter 2: kinematic
@@ -136,23 +137,22 @@ class ThreeWay(Drive):
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """Along like any motor; turning as speed and steering have it at the end of the tick."""
+        """Return a motor's acceleration along, and the turning that follows from the steering."""
         along, _ = self._motor.accelerations(speed, 0.0, now_speed, 0.0, dt)
         rolls = abs(now_speed) > CREEP
         now = min(max(now_turn_rate / now_speed, -self._most), self._most) if rolls else 0.0
-        target = turn_rate / speed if speed > 0.0 else now  # who brakes keeps the wheel
+        target = turn_rate / speed if speed > 0.0 else now  # a braking car keeps its steering
         step = self._most * dt / self._servo if rolls and self._servo > 0.0 else math.inf
         curvature = now + min(max(target - now, -step), step)
         return along, ((now_speed + along * dt) * curvature - now_turn_rate) / dt
 
 
 class GuardedDrive(Guard, Drive):
-    """A drive of a user, kept within the limits of its robot whatever it answers.
+    """Drive of a user, kept within the limits of its robot whatever it answers.
 
-    Both accelerations stay within their limits, and so do the speed and the turn rate that they
-    lead to: never backwards, never too fast. What raises or answers no two finite numbers is
-    counted, and brakes. What aims at more than its profile has is counted too, and what would
-    drive so, even within the limits of acceleration.
+    Both accelerations stay within their limits, and so do the resulting speed and turn rate: never
+    backwards, never too fast. An exception or an answer that is not two finite numbers is counted,
+    and the robot brakes. Aiming at or driving at more than the profile allows is counted, too.
 
     Attributes:
         drive: The user's own.
@@ -181,7 +181,7 @@ class GuardedDrive(Guard, Drive):
         got = self._answer(self.drive.accelerations, *motion)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
         self._judge_motion(along, turn, now_speed, now_turn_rate, dt=dt)
-        # Who was pushed beyond a limit comes back as fast as the accelerations allow.
+        # A robot pushed beyond a limit comes back as fast as the accelerations allow.
         along = _within(along, -now_speed / dt, (spec.max_speed - now_speed) / dt)
         most = spec.max_turn_rate
         turn = _within(turn, (-most - now_turn_rate) / dt, (most - now_turn_rate) / dt)
@@ -214,13 +214,13 @@ class DriveSpec:
     """Body and motors of a robot.
 
     Attributes:
-        mass: [kg]
+        mass: Mass [kg].
         radius: Radius of the circular footprint, or of a circle around the corners [m].
-        max_speed: Forward only [m/s].
-        max_turn_rate: Either way [rad/s].
-        max_acceleration: [m/s^2]
-        max_deceleration: [m/s^2]
-        max_turn_acceleration: Either way [rad/s^2].
+        max_speed: Highest speed, forward only [m/s].
+        max_turn_rate: Highest turn rate in either direction [rad/s].
+        max_acceleration: Highest acceleration [m/s^2].
+        max_deceleration: Highest deceleration [m/s^2].
+        max_turn_acceleration: Highest angular acceleration in either direction [rad/s^2].
         motor_time_constant: Time constant of the speed [s].
         corners: Corners of a convex footprint, x ahead, y to the left [m]; none: a circle.
         drive: Function that makes the motors.
@@ -248,12 +248,12 @@ class DriveSpec:
         )
 
     def safe_speed(self, dt: float) -> float:
-        """Return the speed up to which a tick of `dt` [s] passes nothing thin [m/s]."""
+        """Return the highest speed at which a tick of `dt` [s] cannot skip a thin wall [m/s]."""
         return 0.5 * self.inner_radius / dt
 
     @property
     def stopping_distance(self) -> float:
-        """From top speed on a floor that holds [m]: at full brake, and a motor's lag of it."""
+        """Distance from top speed to a stop on a dry floor, with the motors' lag [m]."""
         braking = 0.5 * self.max_speed**2 / self.max_deceleration
         return braking + self.max_speed * self.motor_time_constant
 

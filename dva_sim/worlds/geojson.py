@@ -134,13 +134,13 @@ KINDS = {
 Points = NDArray[np.float64]
 Fail = Callable[[str], ConfigError]
 
-FARTHEST = 10e3  # from the origin, where a plane still is as good as the earth [m]
+FARTHEST = 10e3  # maximum distance from the origin, where a plane is still accurate [m]
 IN_PARTS = frozenset({"wall", "zone", "wifi"})  # may be drawn as several shapes in one feature
 GEOMETRIC = frozenset(
     {"storey", "floor", "floor_level", "level_id", "ordinal", "layer", "min_level", "max_level"}
     | {"height", "min_height", "elevation", "ele", "z", "width", "thickness", "radius", "rotation"}
 )  # properties that other programs draw by, and plans here ignore
-DIGITS = 9  # of a coordinate [deg]: a tenth of a millimetre
+DIGITS = 9  # decimals of a coordinate in degrees: a tenth of a millimetre
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,8 @@ from dva_sim.worlds.physics import World
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-CELL: Final = 2.0  # side of the cells that walls are sorted by [m]
-LISTENS: Final = 0.25  # who asked so lately will ask again [s]
+CELL: Final = 2.0  # side of the cells by which walls are indexed [m]
+LISTENS: Final = 0.25  # a reader this recent will read again [s]
 EDGE: Final = 1e-9  # a ray through a corner meets both walls, never neither
 
 

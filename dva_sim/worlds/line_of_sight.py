@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Point = tuple[float, float]
 
-ON_LINE = 1e-6  # who is so near to the line of a wall is on it, on neither side [m]
+ON_LINE = 1e-6  # points this near the line of a wall are on neither side of it [m]
 
 
 class Sight:

@@ -27,13 +27,13 @@ UNKNOWN = 255
 
 # What map_saver writes for "never seen" in a trinary map.
 UNKNOWN_SHADE = 205
-NEAR_SHADE = 10  # shades this near may have been that one
-CHANCE_SHARE = 0.01  # share of a scale map that may have that shade by chance
-JPEG_BLUR = 12.0  # by how much the shades of a JPEG may be off: a half step to white
-USUAL_CELLS = 0.005, 1.0  # of a map [m]
-MAX_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
+NEAR_SHADE = 10  # difference of shades that may be one and the same
+CHANCE_SHARE = 0.01  # share of a map's cells that may have a shade by chance
+JPEG_BLUR = 12.0  # maximum error of shades in a JPEG: half a step to white
+USUAL_CELLS = 0.005, 1.0  # usual range of cell sizes of a map [m]
+MAX_CELLS = 40e6  # maximum cells of a grid: planning on it takes some gigabytes
 LARGEST = 5e3  # side of a map [m]
-FARTHEST = 1e7  # of a map from its origin [m]: coordinates of UTM are below
+FARTHEST = 1e7  # maximum distance of a map from its origin; UTM coordinates are below [m]
 
 
 @dataclass(frozen=True, eq=False)

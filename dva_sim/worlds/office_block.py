@@ -23,12 +23,12 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.worlds.geojson import Feature
 
 STOREY = 14.5  # wanted depth of a corridor with the rooms on both its sides [m]
-CORRIDOR = (2.0, 2.6)  # width [m]
-LOBBY = (6.0, 8.0)  # width [m]
-CROSSING_EVERY = 40.0  # along the corridors [m]
+CORRIDOR = (2.0, 2.6)  # range of widths of corridors [m]
+LOBBY = (6.0, 8.0)  # range of widths of lobbies [m]
+CROSSING_EVERY = 40.0  # distance between crossings along the corridors [m]
 MIN_CELL = 2.8  # width of the narrowest room [m]
-WISHES = ((3.0, 3.9), (4.8, 6.5), (7.0, 9.5))  # widths that rooms would like to have [m]
-ODDS = (0.55, 0.30, 0.15)  # of these
+WISHES = ((3.0, 3.9), (4.8, 6.5), (7.0, 9.5))  # ranges of preferred widths of rooms [m]
+ODDS = (0.55, 0.30, 0.15)  # probability of each range
 
 
 class FloorCell(NamedTuple):
@@ -202,9 +202,9 @@ def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
     return [tenths(start + reach) for reach in (0.0, *np.cumsum(widths))]
 
 
-STAIRS_EVERY = 40.0  # along a facade [m]
-BASE_GAP = 1.2  # between robot bases [m]
-BASE_WALL = 0.7  # from a robot base to the walls [m]
+STAIRS_EVERY = 40.0  # distance between stairs along a facade [m]
+BASE_GAP = 1.2  # distance between robot bases [m]
+BASE_WALL = 0.7  # distance of a robot base from the walls [m]
 APPROACH = 1.6  # free floor behind the door of a robot bay [m]
 
 
@@ -292,8 +292,8 @@ LARGE = (
 )
 COPY_ROOM_EVERY = 9
 MAX_BAYS = 4
-MEDIUM_FROM = 20.0  # [m^2]
-LARGE_FROM = 36.0  # [m^2]
+MEDIUM_FROM = 20.0  # area from which a room counts as medium [m^2]
+LARGE_FROM = 36.0  # area from which a room counts as large [m^2]
 
 
 def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
@@ -372,10 +372,10 @@ def base_positions(bay: FloorCell) -> list[tuple[float, float]]:
     return [(tenths(x), tenths(y)) for y in ys for x in xs]
 
 
-POST_ROOM = 0.5  # of a guard post from the walls [m]
-DETECTOR_EVERY = 8.0  # along corridors [m]
-CAMERA_RANGE = 20.0  # [m]
-MASTS_EVERY = 25.0  # Wi-Fi base stations along corridors [m]
+POST_ROOM = 0.5  # distance of a guard post from the walls [m]
+DETECTOR_EVERY = 8.0  # distance between detectors along corridors [m]
+CAMERA_RANGE = 20.0  # range of a camera [m]
+MASTS_EVERY = 25.0  # distance between Wi-Fi base stations along corridors [m]
 RESTRICTED = ("Server room", "Plant room")
 
 

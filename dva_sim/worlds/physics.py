@@ -1,7 +1,7 @@
-"""Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
+"""Physics of moving bodies seen from above: robots and people push, slip and stop (pymunk).
 
-What a robot's motors do is in `drives`; what its wheels hold, and what counts as a contact or a
-jam, in `bodies`. A bare hall with walls as one likes is where drives are tried.
+Motors are in `drives`; the grip of wheels, contacts and jams in `bodies`. Drives are tested in a
+bare `hall` with arbitrary walls.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, rasterise
 from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
-MASS: Final = 75.0  # of an adult [kg]
-RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
-MAX_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
+MASS: Final = 75.0  # mass of an adult [kg]
+RELAXATION: Final = 0.5  # relaxation time of a person's velocity towards the wanted one [s]
+MAX_PUSH: Final = 3.0  # maximum force of a person's legs per mass [m/s^2]; assumed
 
 
 class PersonBody(Body):
-    """A person seen from above, a disc that walks any way; made by `World.add_person`.
+    """Person seen from above, a disc that walks in any direction; made by `World.add_person`.
 
-    Legs push towards the wanted velocity as in the model of social forces, with bounded force;
-    whom to keep clear of is for the walker to decide.
+    Legs push towards the wanted velocity as in the model of social forces, with bounded force. The
+    walker's own logic keeps clear of others.
 
     References:
         D. Helbing, P. Molnar: Social force model for pedestrian dynamics. Physical Review E
@@ -53,10 +53,11 @@ class PersonBody(Body):
     kind = PERSON
 
     def __init__(self, world: Ticks, name: str, pose: Pose, radius: float) -> None:
+        # An infinite moment of inertia: contacts do not turn a person.
         body = pymunk.Body(MASS, math.inf)
         body.position = pose.x, pose.y
         shape = pymunk.Circle(body, radius)
-        # Who brushes past a wall or somebody else is not held back.
+        # Brushing past a wall or another body does not slow a person down.
         shape.friction = 0.0
         shape.elasticity = 0.0
         shape.collision_type = self.kind
@@ -66,7 +67,7 @@ class PersonBody(Body):
         self._asked = AskedFor((0.0, 0.0))
 
     def walk(self, vx: float, vy: float) -> None:
-        """Want to walk with this velocity [m/s] from the next tick on, until told otherwise.
+        """Set the wanted velocity [m/s] from the next tick on.
 
         Raises:
             ValueError: it is not finite.
@@ -77,7 +78,7 @@ class PersonBody(Body):
         self._world.wake(self)
 
     def take_up(self, radius: float) -> None:
-        """Be so wide from now on [m]: who turns sideways fits through a narrower gap."""
+        """Set the radius [m]: a person who turns sideways fits through a narrower gap."""
         self.radius = radius
         self._circle.unsafe_set_radius(radius)
 
@@ -103,21 +104,21 @@ class PersonBody(Body):
 SLOP = 0.005  # overlap that a contact may keep; pymunk's default is for pixels [m]
 OVERLAP = 0.02  # overlap with a wall that is forgiven when a body is placed [m]
 
-_FIXED = 0b01  # categories: what is asked of the space can leave walls out
+_FIXED = 0b01  # categories, by which queries of the space can leave walls out
 _MOVING = 0b10
 _MOVERS = pymunk.ShapeFilter(mask=_MOVING)
 
 
 class World(Ticks):
-    """Walls, robots and people of one site.
+    """World of one site: walls, robots and people.
 
     Args:
-        site: Gives the walls.
+        site: Site with the walls.
         dt: Length of a tick [s], a whole number of microseconds.
 
     Attributes:
-        robots: In the order in which they were added.
-        people: Likewise.
+        robots: Robots in the order in which they were added.
+        people: People in the order in which they were added.
     """
 
     def __init__(self, site: Site, dt: float = 0.02) -> None:
@@ -161,13 +162,13 @@ class World(Ticks):
         return person
 
     def put(self, person: PersonBody, x: float, y: float) -> None:
-        """Let a person stand somewhere else at once [m].
+        """Move a person to another place at once [m].
 
         Raises:
             ConfigError: a wall, a robot or another person is in the way.
         """
         shape = person.shape
-        shape.filter = pymunk.ShapeFilter(categories=0)  # nobody is in one's own way
+        shape.filter = pymunk.ShapeFilter(categories=0)  # the person's own shape must not count
         try:
             self._check_place("person", person.name, Pose(x, y, 0.0), person.radius)
         finally:
@@ -178,7 +179,7 @@ class World(Ticks):
         self.wake(person)
 
     def remove(self, person: PersonBody) -> None:
-        """Take somebody away who has left the site; where it was last, it still says."""
+        """Remove a person who has left the site; its body keeps its last position."""
         self.people.remove(person)
         self.forget(person)
         self.space.remove(person.body, person.shape)
@@ -203,20 +204,22 @@ class World(Ticks):
         self._by_shape[body.shape] = body
 
     def neighbours(self, x: float, y: float, within: float) -> list[tuple[Body, float]]:
-        """Robots and people whose middle is within a distance [m] of a point, the nearest first."""
+        """Return robots and people with their middle near a point [m], nearest first."""
         neighbours = []
         for hit in self.space.point_query((x, y), within, _MOVERS):
             assert hit.shape is not None
             body = self._by_shape[hit.shape]
             distance = math.hypot(body.x - x, body.y - y)
+            # The query finds bodies whose edge is near enough, too.
             if distance <= within:
                 neighbours.append((body, distance))
+        # By name where distances are equal, since the order of the query is arbitrary.
         return sorted(neighbours, key=lambda pair: (pair[1], pair[0].name))
 
     # --- contacts ----------------------------------------------------------------------
 
     def _pair(self, arbiter: pymunk.Arbiter) -> tuple[tuple[Body, Body | None], ...]:
-        """Return each body of a contact with what it touches: somebody, or a wall (None)."""
+        """Return each body of a contact with the one it touches; None stands for a wall."""
         one, other = (self._by_shape.get(shape) for shape in arbiter.shapes)
         sides = ((one, other), (other, one))
         return tuple((body, partner) for body, partner in sides if body is not None)

@@ -15,16 +15,16 @@ from dva_sim.worlds.maps import OccupancyGrid
 from dva_sim.worlds.site import Site
 
 CELL = 0.2  # side of a planning cell [m]
-COMFORT = 1.0  # nearer to a wall than this, a way costs more [m]
-SHYNESS = 4.0  # how much more, right at the wall
-STEP = 0.25  # between the points of a finished way [m]
-SNAP = 1.5  # how far to look for a planning cell around a start or goal [m]
-ROUNDS = 20  # of smoothing
-SPARE = 0.30  # on top of the clearance: so near to a wall may a rounded corner get [m]
+COMFORT = 1.0  # distance to walls below which a path costs more [m]
+SHYNESS = 4.0  # factor of that cost right at a wall
+STEP = 0.25  # distance between the points of a finished path [m]
+SNAP = 1.5  # distance within which a planning cell is looked for around a start or goal [m]
+ROUNDS = 20  # rounds of smoothing
+SPARE = 0.30  # minimum distance of a rounded corner to a wall on top of the clearance [m]
 KEPT_FIELDS = 256
 KEPT_PATHS = 2048
 KEPT_MAPS = 4
-KEPT_NODES = 2**24  # of all kept fields together, 12 bytes each
+KEPT_NODES = 2**24  # maximum nodes of all cached fields together, 12 bytes each
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]

@@ -264,10 +264,10 @@ class Site(FloorPlan):
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
 PLANS = (".geojson", ".json")
 DESKS = 2  # operator desks on a bare map
-BASE_SPACING = 1.5  # between places that are not drawn [m]
-PASSED_BY = 0.5  # radius that must fit at them on a plan: more than the doors have, mostly [m]
-MAX_DETECTORS = 2000  # of a kind on a bare map; on a larger floor they are further apart
-AT_RANDOM = 100  # tries, before what is left is looked at cell by cell
+BASE_SPACING = 1.5  # distance between places that are not drawn [m]
+PASSED_BY = 0.5  # radius that must fit at places of a plan: mostly more than at doors [m]
+MAX_DETECTORS = 2000  # maximum detectors of a kind on a bare map; larger floors have fewer per area
+AT_RANDOM = 100  # random tries before all remaining cells are looked at
 DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a bare map [m]
 
 

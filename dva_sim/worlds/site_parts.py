@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from dva_sim.worlds.geo import Pose
 
 Points = NDArray[np.float64]
-CEILING = 3.0  # of a room that does not say [m]
-SQUARE = 4.0  # side of a square that remembers which areas are near [m]
-DOOR_HEIGHT = 2.1  # of a door that does not say [m]
+CEILING = 3.0  # default height of a room [m]
+SQUARE = 4.0  # side of the squares by which nearby areas are indexed [m]
+DOOR_HEIGHT = 2.1  # default height of a door [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Room(NamedArea):
     paved: bool = True
 
 
-PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for what lies there [m]
+PROBES = (0.06, 0.2, 0.35, 0.5)  # distances from a door at which areas beside it are looked up [m]
 
 
 def beyond(rooms: Lookup[Room], x: float, y: float, heading: float) -> Room | None:

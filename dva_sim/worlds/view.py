@@ -58,9 +58,9 @@ ZONES = {
 }
 # How coverage is shown: colour and opacity; good is left blank.
 COVERAGE = {"fair": ("#f0e442", 0.24), "poor": ("#e69f00", 0.34), "none": ("#8f5b8a", 0.4)}
-WALL_WIDTH = 0.14  # as drawn [m]
-MARGIN = (0.8, 0.012)  # around the site: at least [m], of its width
-SCALE_BAR_PLACE = (0.6, 0.045)  # the same for the scale bar
+WALL_WIDTH = 0.14  # drawn width of walls [m]
+MARGIN = (0.8, 0.012)  # margin around the site: minimum [m], and share of the site's width
+SCALE_BAR_PLACE = (0.6, 0.045)  # the same for the scale bar: minimum [m], and share of the width
 ARC_POINTS = 9
 
 
@@ -251,10 +251,10 @@ def _outline(area: Any) -> Outline:
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
-LONG_SIDE = 8.4  # of the picture [in]; a page shows 840 pixels of it
-MAX_INCHES = 18.0  # of the picture, at most [in]
+LONG_SIDE = 8.4  # long side of the picture; a page shows it 840 pixels wide [in]
+MAX_INCHES = 18.0  # maximum side of the picture [in]
 INCHES_PER_METRE = 0.07
-FONT = 7.5  # of the key [pt]
+FONT = 7.5  # font size of the key [pt]
 KEY = 1.25  # width of an entry of the key [in]
 KEY_LINE = 0.17  # height of a line of the key [in]
 

@@ -41,8 +41,8 @@ CAMERA = "#aa4499"
 STATION = "#332288"
 POINTS_PER_INCH = 72.0
 FULL_SIZE = 16.0  # scale at which marks have their full size [pt/m]
-ARROW = 9.0  # half the length of the one to the north [pt]
-RAYS = 61  # of a camera's field of view
+ARROW = 9.0  # half the length of the arrow to the north [pt]
+RAYS = 61  # rays of a camera's field of view
 BARS = (1, 2, 5, 10, 20, 50, 100)  # lengths of a scale bar [m]
 
 
@@ -145,11 +145,11 @@ def mast() -> Path:
 
 
 # --- names of rooms --------------------------------------------------------------------
-SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # [pt]
+SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # font sizes of names [pt]
 LINE = 1.15  # height of a line, in font sizes
-SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
-GAP = 0.2  # between a name and the walls [m]
-PLACES = 9  # tried along each side of a room
+SLACK = 0.3  # spare room of a line, as fonts are drawn in whole dots [font sizes]
+GAP = 0.2  # gap between a name and the walls [m]
+PLACES = 9  # places tried along each side of a room
 MAX_LINES = 3
 # How much less legible a name is that is turned, covers something, is only a number.
 TURNED_SHARE = 0.8

@@ -162,7 +162,7 @@ SENSOR_ALARMS = {
 which gas it is: the one that explodes first counts."""
 
 
-MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
+MOVED_SINCE = 2.0  # distance that a device may have moved since its last report; assumed [m]
 
 
 def at_event_m(scenario: Scenario) -> float:

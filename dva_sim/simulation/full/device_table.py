@@ -15,7 +15,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
 from dva_sim.simulation.full.dva_server import DvaAgent
 
-MAX_ROWS: Final = 200  # of the table; more are read by nobody
+MAX_ROWS: Final = 200  # maximum rows of the table
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage
 
-LOOK = 0.05  # how often it is looked whether the drive has begun [s]
+LOOK = 0.05  # interval of checks whether the drive has begun [s]
 
 
 class Disturbance:

@@ -32,10 +32,10 @@ from dva_sim.protocol.codec import decode, decode_if_valid
 from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.facts import Fact
 
-MAX_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
-FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
-MAX_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
-TICK = 1.0  # how often the core looks at deadlines [s]
+MAX_REPORTED = 20_000  # maximum events whose last publication is remembered and not repeated
+FIRST_BEAT = 1.27  # first heartbeat after the start, when hardly any other event coincides [s]
+MAX_TURNED_AWAY = 1000  # maximum unregistered devices that are remembered as reported
+TICK = 1.0  # interval at which the core checks deadlines [s]
 NOTHING_TO_KEEP: Final = (
     *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo, m.RobotEmergency),
     *(m.GetEventList, m.GetDispatch, m.GetProposal, m.GetRequestLog),

@@ -29,8 +29,8 @@ from dva_sim.simulation.full.control_room import make_core
 from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.simulation.scenario import Scenario, robot_profiles
 
-REMEMBERED = 20_000  # sends that an answer may still come to
-OWN_CODE = ".py:"  # in a name: a class of the user's, in a file
+REMEMBERED = 20_000  # maximum sent messages that may still be answered
+OWN_CODE = ".py:"  # part of a name that refers to a user's class in a file
 
 Sink = Callable[[str], object]
 T = TypeVar("T", Reaction, list[Send])

@@ -1,9 +1,9 @@
-"""A second book of the events, kept by what is said on the network: the DVA's is held against it.
+"""Independent ledger of the events, from messages on the network, to check the DVA's table.
 
-It notes who was sent where, who took that up, since when an event waits or is in the same hands,
-and what those who were sent have found; the fields of the DVA's events are not asked for that.
-It also notes who was heard: a permission whose holder is silent should be in no book; and which
-sessions are over: of each one the robot has to be told.
+It notes which devices were sent where, which accepted, since when an event waits or is in the same
+hands, and the findings; the fields of the DVA's events are not used for that. It also notes which
+devices were heard, since no permission may outlive a silent holder, and which sessions are over,
+since each robot has to be told.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventTable, 
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Page, Right
 
-STEP_SLACK = 0.5  # of the time of a step of an event [s]
+STEP_SLACK = 0.5  # tolerance of the time of a step of an event [s]
 PENDING_SLACK = 2.0  # the core looks at deadlines once a second, the audit twice [s]
-SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
-LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wrote last [s]
+SILENT_AFTER = 10.0  # a device silent for this long holds nothing any longer [s]
+LOST_BY_RESTART = 1.0  # a killed DVA continues from the time of its last write [s]
 INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
-RETURNED_WITHIN = 8.0  # a DVA of regions has its events back from its deputy [s]
-SIMULTANEOUS_S = 20.0  # two deaths of DVAs within that are at once: copies take a while [s]
-HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
-STIRRED = 0.25  # who has moved less has not moved: half of the DVA's own limit [m]
-MAX_MOVE_M = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
-FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
-UNREPLICATED: Final = "unreplicated"  # said of a report that the deputy may not have
-MAX_KEPT = 1000  # reports and orders that wait for an answer, and events
+RETURNED_WITHIN = 8.0  # time in which a regional DVA gets its events back from its deputy [s]
+SIMULTANEOUS_S = 20.0  # deaths of DVAs within this time are simultaneous: copies take a while [s]
+HEARD_LATE = 25.0  # longest delay of a reported position over a bad link [s]
+STIRRED = 0.25  # least distance that counts as a move: half of the DVA's own limit [m]
+MAX_MOVE_M = 25.0  # maximum distance by which an event is moved to where a person sees it [m]
+FELT_LATELY = 10.0  # time for which a robot's sensor value may confirm an event [s]
+UNREPLICATED: Final = "unreplicated"  # text of the reply to a report that the deputy may not have
+MAX_KEPT = 1000  # maximum unanswered reports, unanswered orders, and events that are kept
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
 IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
@@ -43,7 +43,7 @@ _ORDERED: Final = (
     *(b"<PermissionRevocation>", b"<Permission>"),
 )
 """Messages of the DVA that are read, besides replies that are waited for."""
-OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
+OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # most of the messages that reach the DVA
 Broken = tuple[str, str]
 
 
@@ -51,10 +51,10 @@ class Debt(NamedTuple):
     """Next step that a device owes after accepting an order: to set out, or to move.
 
     Attributes:
-        who: Device that has the order; None: nobody owes anything.
+        who: Device that has the order; None: no step is owed.
         step: True if it has set out, and so has to move.
-        since: From when on [s].
-        place: Its place at that time.
+        since: Start of the debt [s].
+        place: Position of the device at that time.
     """
 
     who: str | None
@@ -69,12 +69,12 @@ class Seen(NamedTuple):
     Attributes:
         found: Findings and actions reported at the event.
         hands: Devices in charge, by task; empty: nobody.
-        since: From when on those do.
-        waits: Since when it has waited for somebody who takes it up.
-        began: The same, as the book has it.
-        times: Time of each step, as the book has it.
+        since: Start of that.
+        waits: Start of the wait for a device that accepts it.
+        began: The same by the DVA's table.
+        times: Time of each step by the DVA's table.
         debt: Next step owed by the device in charge.
-        is_over: True if it is closed, and nothing happens to it any more.
+        is_over: True if it is closed and final.
     """
 
     found: frozenset[str]
@@ -118,7 +118,7 @@ class Word:
 
 
 class EventLedger:
-    """A second book of the events, by what is said on the network, beside what the DVA's shows.
+    """Ledger of events from messages on the network, compared with the DVA's table.
 
     Args:
         rules: Limits on the waiting time of an event, and on the time of one responder.
@@ -126,7 +126,7 @@ class EventLedger:
         place_of: True position of a device.
         at_event: Distance within which a device may have seen the event [m].
         name: Function that returns the name of a device by its id.
-        books: Ledgers of all DVAs: an event may be in the book of another one.
+        books: Ledgers of all DVAs: an event may be in the table of another one.
 
     Attributes:
         knows_places: True if true positions are known; otherwise devices are believed.
@@ -173,7 +173,7 @@ class EventLedger:
         self._down_at = -math.inf
         self._not_kept = 0.0
 
-    # --- what is said --------------------------------------------------------------------
+    # --- messages ------------------------------------------------------------------------
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
         """Note what has reached the DVA; `source` has really sent it."""
@@ -214,15 +214,15 @@ class EventLedger:
         word.freed = word.freed or device in word.ordered
 
     def is_heard(self, source: str, now: float) -> None:
-        """Note that the DVA has heard a device, whatever it said."""
+        """Note that the DVA has received any message of a device."""
         self._heard[source] = now
 
     def kept_nothing_for(self, seconds: float) -> None:
-        """Note that the DVA that was killed could write nothing for so long before [s]."""
+        """Note the time before its death in which a killed DVA could write nothing [s]."""
         self._not_kept = seconds
 
     def waits_for(self, data: bytes) -> bool:
-        """Return True for an order of the DVA, or an answer that is waited for."""
+        """Return True for an order of the DVA, or an answer that is expected."""
         has_requests = self._asked or self._called_false
         return any(what in data for what in _ORDERED) or (bool(has_requests) and b"<reply>" in data)
 
@@ -283,7 +283,7 @@ class EventLedger:
             word.taken.add(device)
 
     def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
-        """Count a finding of somebody who was sent; a confirmation needs a device at the place.
+        """Count a finding of a device that was sent; a confirmation needs a device at the place.
 
         An operator who has been sent again with another robot may still report for the first.
         """
@@ -297,12 +297,12 @@ class EventLedger:
 
     def _is_near(self, device: str, event: Event) -> bool:
         if not self.knows_places or any(device == book._dva for book in self._books):
-            return True  # another DVA has its own ledger, by which whom it sends is judged
+            return True  # another DVA's devices are judged by its own ledger
         place = self._place_of(device)
         return place is not None and apart(place, event.position) <= self._at_event
 
     def _answers(self, reporter: str, reply: m.Reply) -> None:
-        """Note that the DVA has taken a report, so there is an event, or a person's word: none."""
+        """Note that the DVA accepted a report, or a person's statement of a false alarm."""
         none = self._called_false.pop((reporter, reply.answers), None)
         if none is not None and reply.code == m.OK:
             self._word(none).found.add("refuted")
@@ -312,7 +312,7 @@ class EventLedger:
             self._unreplicated += [report] if reply.text == UNREPLICATED else []
             del self._unreplicated[:-MAX_KEPT]
 
-    # --- what the book shows -------------------------------------------------------------
+    # --- the DVA's table -----------------------------------------------------------------
 
     def check(self, now: float, page: Page) -> Iterator[Broken]:
         """Yield what is wrong with the event table now."""
@@ -322,7 +322,7 @@ class EventLedger:
         last = self._now
         self._now = now
         yield from self._unheard(page.rights, now, page.works)
-        if not page.works:  # what it has not kept, nobody knows when it is back
+        if not page.works:  # it may come back without what it had not saved
             self._let_no_time_pass(passed)
             self._down_at = self._down_at if self._was_down else now
             self._was_down = True
@@ -403,7 +403,7 @@ class EventLedger:
                 _keep_newest(self._lost)
 
     def _find_again(self, event: Event) -> None:
-        """Count those sent to a lost event for a new one of its number, kind and place as well."""
+        """Take over the orders of a lost event for a new one of its number, kind and place."""
         kind, place, word = self._lost.pop(event.number)
         if event.kind == kind and apart(event.position, place) <= MAX_MOVE_M:
             new = self._word(event.number)
@@ -432,7 +432,7 @@ class EventLedger:
         return (e for e in same if apart(e.position, report.position) < near)
 
     def _adopt(self, now: float) -> None:
-        """Accept the first page as it is: its events are of an earlier life of the DVA.
+        """Accept the first table as it is: its events are from before a restart of the DVA.
 
         Their responders count as ordered there, although no order was heard here.
         """
@@ -456,16 +456,17 @@ class EventLedger:
         return any(when > registered for when in registrations)
 
     def _may_be_gone(self, number: int, kind: str, place: m.Position) -> bool:
-        """Return True if another DVA has such an event, or nobody was told that one has a copy.
+        """Return True if another DVA may have the event, or if its loss was not excluded.
 
-        Or it was over just before its DVA died: deputies keep copies of open events.
+        Deputies keep copies of open events only, so one that was closed just before its DVA died
+        may be gone.
         """
         if len(self._books) > 1 and self._word(number).found:
             return True
         near = max(self._rules.merge_distance, SAME_SPOT)
         other_books = [book for book in self._books if book is not self]
         if not all(book._worked_since(self._down_at - SIMULTANEOUS_S) for book in other_books):
-            return True  # that a DVA and its deputy die at once is not promised to be harmless
+            return True  # the death of a DVA together with its deputy may lose events
         tables = [book._events for book in other_books]
         all_events: list[Event | m.EventReport] = [*self._unreplicated]
         all_events += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
@@ -508,7 +509,7 @@ class EventLedger:
     def _check_informed(
         self, before: Iterable[Right], rights: Sequence[Right], now: float, works: bool
     ) -> Iterator[Broken]:
-        """Yield sessions that are over in the book, and whose end the robot has not learnt.
+        """Yield sessions that have ended without the robot having been told.
 
         Time in which the robot is not heard does not count, nor does that of a silenced DVA. A
         robot also learns of it by a new session for its holder, and from a report of its holder.
@@ -533,7 +534,7 @@ class EventLedger:
     def _of_event(
         self, event: Event, old: Seen | None, now: float, last: float
     ) -> Iterator[Broken]:
-        """Yield what is wrong with an event; `last` is when the book was last looked at [s]."""
+        """Yield what is wrong with an event; `last` is the time of the last check [s]."""
         new = self._look(event, old, now)
         rules = self._rules
         for step, when in event.times.items():
@@ -579,10 +580,10 @@ class EventLedger:
                 )
 
     def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
-        """Yield somebody who has not set out, or does not move, and still has the order."""
+        """Yield a device that has not set out, or does not move, and still has the order."""
         rules = self._rules
         owed = now - debt.since
-        # A robot that creeps may pass the DVA's limit once more from where it stood before.
+        # A creeping robot may just exceed the DVA's limit, which then starts again.
         still = 2 * rules.still_within + HEARD_LATE
         within = still if debt.step else rules.depart_within
         if debt.who is not None and owed > within + PENDING_SLACK:
@@ -590,7 +591,7 @@ class EventLedger:
             yield "S6", f"event {event.number}: {self._name(debt.who)} {what} for {owed:.0f} s"
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
-        """Track waiting: it ends when somebody accepts the event, and restarts on confirmation."""
+        """Track the wait: it ends when a device accepts the event, and restarts on confirmation."""
         conclusions = FOUND.intersection((*event.times, event.state.value))
         old = old or Seen(conclusions - FOUND, (), now, now, now)
         word = self._word(event.number)
@@ -599,8 +600,8 @@ class EventLedger:
         if word.freed and hands == old.hands and event.times.get(step) != old.times.get(step):
             word.sent_again = True
         if word.sent_again or hands != old.hands:
-            word.taken -= word.loose  # the order may still wait in the DVA's queue
-        # A DVA that comes back knows of who has set out; who registers again goes on.
+            word.taken -= word.loose  # the new order may still wait in the DVA's queue
+        # A restarted DVA knows which devices have set out; those that register again continue.
         under_way = ("act_departed" if hands[:1] == ("act",) else "departed") in event.times
         taken = bool(word.taken.intersection(hands)) or (bool(hands) and under_way)
         confirmed = "confirmed" in conclusions - old.found

@@ -16,13 +16,13 @@ from dva_sim.worlds.hazards import Hazard, Surroundings, find_hazard, first_dete
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import Detector
 
-REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
-CLEARANCE = 0.7  # around the middle of a hazard, so that a robot can get near [m]
-MIN_BASE_DISTANCE_M = 6.0  # from every base, so that there is a way to go [m]
+REACHABLE = 0.4  # radius that fits through the doors on the way to a hazard [m]
+CLEARANCE = 0.7  # free radius around the middle of a hazard, so that a robot can get near [m]
+MIN_BASE_DISTANCE_M = 6.0  # minimum distance from every base [m]
 TRIES = 200
-HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
-HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
-SAME_PLACE = 4.0  # what is so near a place is what is there [m]
+HEARSAY_WITHIN = 3.0  # maximum error of the place that further callers report [m]
+HEARSAY_LATE = (2.0, 20.0)  # shortest and longest delay of further reports after the first [s]
+SAME_PLACE = 4.0  # a hazard within this distance counts as being at a place [m]
 
 Danger = tuple[tuple[float, float], float]  # the middle and the radius of a place to keep off [m]
 

@@ -15,9 +15,9 @@ from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full import observations as o
 from dva_sim.simulation.full.stage import DVA
 
-DIGITS = 5  # of what is measured: ticks of the motors and slacks of the rules are far longer
+DIGITS = 5  # decimals of measured values: finer than motor ticks and the rules' tolerances
 
-DEGREES = 8  # of latitude and longitude: a millimetre
+DEGREES = 8  # decimals of latitude and longitude: a millimetre
 
 Plain = dict[str, Any]
 

@@ -230,7 +230,7 @@ class Observer(Listener, Protocol):
         """Take a new mean time that a message takes a robot's computer [s]."""
 
 
-MAX_SENT = 50_000  # messages of which is known who has sent them
+MAX_SENT = 50_000  # maximum messages whose sender is remembered
 
 
 class Senders:
@@ -360,7 +360,7 @@ class FactGap(NamedTuple):
 Fact = Sent | Arrived | Heard | Accepted | ByHand | MotionNews | PlaceNews | BookNews
 Fact |= Deafened | Slowed | FactGap
 Put = Callable[[Any], object]
-_QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
+_QUIET = b"<HBMsg>", b"<RobotStatus>"  # messages that only show that a device is present
 
 
 class FactLog:

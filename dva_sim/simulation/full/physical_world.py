@@ -22,7 +22,7 @@ from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.physics import World
 
-PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
+PHYSICS_TICK = 0.04  # step of the physics: two centimetres at top speed [s]
 DANGEROUS = Conditions(
     temperature=60.0,
     heat_flux=2.5,
@@ -33,8 +33,8 @@ DANGEROUS = Conditions(
     explosive=0.2,
 )
 """Causes of danger at a place, by the limits of `danger_radius` (docs/explanation/hazards.md)."""
-LOOK_AGAIN = 10.0  # from one look whether a hazard has become graver to the next [s]; assumed
-REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
+LOOK_AGAIN = 10.0  # interval of checks whether a hazard has become graver [s]; assumed
+REPORT_AGAIN = 2.0  # pause after a report that was refused or not answered [s]
 
 
 class Field(RunHazards):
@@ -63,7 +63,7 @@ class Field(RunHazards):
         self.bystanders += [team.add_bystander(n + 1) for n in range(scenario.bystander.count)]
 
     def people(self) -> Iterator[tuple[str, GuardAgent | PersonGuard | BystanderAgent]]:
-        """Yield everybody on foot, by name."""
+        """Yield all people on the site, by name."""
         for guard in self.guards:
             yield guard.device.label, guard
         for bystander in self.bystanders:
@@ -170,7 +170,7 @@ class Field(RunHazards):
         self.stage.clock.every(LOOK_AGAIN, look)
 
     def _say(self, device: AgentDevice, body: m.EventReport) -> None:
-        """Report until the DVA has taken it: it is said only once."""
+        """Report until the DVA has accepted it: detectors report an event only once."""
 
         def again() -> None:
             self.stage.clock.call_after(REPORT_AGAIN, self._say, device, body)

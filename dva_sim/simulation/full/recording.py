@@ -18,7 +18,7 @@ from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.site import Site
 
-MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
+MERGED_WITHIN = 8.5  # the DVA merges reports this near each other into one event [m]
 
 
 class PersonLog(NamedTuple):

@@ -16,10 +16,10 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import PEER
 from dva_sim.simulation.full.dva_server import DvaAgent
 
-PASS_WITHIN: Final = 3.0  # design: the other DVA takes a report by then, or this one does [s]
-COPY_WITHIN: Final = 0.3  # design: a report waits so long for its copy at the deputy [s]
-JOIN_AFTER: Final = 0.1  # design: from the start to the first registration with the others [s]
-STATUS_PERIOD: Final = 2.0  # design: [s]
+PASS_WITHIN: Final = 3.0  # design: the other DVA takes a report within this time, or this does [s]
+COPY_WITHIN: Final = 0.3  # design: time for which a report waits for its copy at the deputy [s]
+JOIN_AFTER: Final = 0.1  # design: delay of the first registration with other DVAs [s]
+STATUS_PERIOD: Final = 2.0  # design: time between two status messages [s]
 OF_A_DVA: Final = m.HandOver | m.Order | m.Relocation | m.TaskAward | m.PermissionGrant
 UNREPLICATED: Final = "unreplicated"
 NOT_COPIED: Final = "reports acknowledged without a copy at the deputy"

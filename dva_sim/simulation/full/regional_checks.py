@@ -19,13 +19,15 @@ from dva_sim.simulation.full.event_ledger import SIMULTANEOUS_S, UNREPLICATED
 from dva_sim.simulation.full.observations import Page, SafetyTerms
 
 OBEYS_WITHIN: Final = 5.0  # delay allowed between an order and its first effect [s]
-HEALS_WITHIN: Final = 30.0  # two DVAs that hear each other agree after that [s]
-HEARD_WITHIN: Final = 6.0  # a DVA that was heard within that hears the other one now [s]
-SHOWN_WITHIN: Final = 5.0  # a DVA whose book was not seen for so long is dead [s]
-PASSED_WITHIN: Final = 0.9  # an event that was passed on is in the other book by then [s]
-GOES_ON_WITHIN: Final = 15.0  # after a take-over the events of the dead are open again [s]
-COMES_BACK_WITHIN: Final = 60.0  # after the end of an event those who were lent are free [s]
-MAX_MOVE_M: Final = 25.0  # an event that a robot has felt is moved to where it is seen [m]
+HEALS_WITHIN: Final = 30.0  # time in which two DVAs that hear each other have to agree [s]
+HEARD_WITHIN: Final = 6.0  # a DVA heard within this time counts as reachable now [s]
+SHOWN_WITHIN: Final = 5.0  # a DVA whose table was not seen for this long is dead [s]
+PASSED_WITHIN: Final = 0.9  # time in which an event that was passed on is in the other table [s]
+GOES_ON_WITHIN: Final = (
+    15.0  # time after a takeover in which a dead DVA's events are open again [s]
+)
+COMES_BACK_WITHIN: Final = 60.0  # time after an event in which lent responders are free [s]
+MAX_MOVE_M: Final = 25.0  # maximum distance by which an event is moved to where it is seen [m]
 MAX_KEPT: Final = 1000
 
 CHECKED: Final = {

@@ -57,9 +57,9 @@ from dva_sim.simulation.full.stage import DVA, Stage, dvas_of, id_of
 from dva_sim.simulation.scenario import Scenario, request_timeout_s
 from dva_sim.simulation.scenario.parts import DvaDeath
 
-# Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
+# Rate of messages besides pictures and commands: heartbeats, status, orders; assumed, and ample.
 OTHERS_HZ = 20.0
-MESSAGE = 1000  # more than any but a picture takes, with all headers [B]
+MESSAGE = 1000  # upper bound of the size of a message other than a picture, with headers [B]
 COINCIDING_MESSAGES = 10  # messages that may coincide with a picture; assumed
 
 
@@ -73,8 +73,8 @@ def load_of(scenario: Scenario) -> Load:
 
 
 LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)
-WATCH_PERIOD = 0.5  # how often tracks are sampled and rules are checked [s]
-FILM_PERIOD = 0.1  # the same where pictures are wanted [s]
+WATCH_PERIOD = 0.5  # interval at which tracks are sampled and rules are checked [s]
+FILM_PERIOD = 0.1  # the same if pictures are wanted [s]
 
 
 def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recording:
@@ -108,13 +108,13 @@ class RealLinks(Protocol):
         """Transport of the messages."""
 
     def join(self, kind: str, number: int) -> str:
-        """Open the sockets of a device by its kind and number: its address."""
+        """Open the sockets of a device by its kind and number; return its address."""
 
     def time_of_day(self) -> tuple[float, bool]:
         """Return the start of the run [s since midnight], and True for exact timestamps."""
 
     def watch(self, listener: Listener) -> None:
-        """Tell of each message that is sent or arrives."""
+        """Report each message that is sent or arrives to a listener."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,11 @@ class Watched:
     """Options of a run whose clock is driven from outside, and that people may join.
 
     Attributes:
-        clock: Its time.
+        clock: Clock of the run.
         recorder: Recorder of the run.
         cameras: Addresses of the robots' pictures.
-        seats: So many operators are people, the last ones, if the scenario names none.
-        keeps: True to keep everything for measuring; without, a run may last forever.
+        seats: Number of operators, the last ones, who are people if the scenario names none.
+        keeps: True to keep everything for measures; a run without it may last for ever.
         real: Transport of the messages; None: the network that the scenario models.
         memory: State that survives the DVA.
         time_of_day: Time of day at the start, and exactness of timestamps; see `AgentDevice`.
@@ -146,7 +146,7 @@ class Watched:
 
 
 class Run:
-    """Everybody in place on the network, at time zero.
+    """Run of a scenario: all devices in place on the network at time zero.
 
     Args:
         seed: Random seed of everything but the persons.
@@ -313,7 +313,7 @@ class Run:
         )
 
     def _events(self) -> list[Event]:
-        """Return every event once: of one that was taken over the state that is newest."""
+        """Return every event once; for one that was taken over, its latest state."""
         events: dict[int, Event] = {}
         for dva in sorted(self._ever, key=lambda dva: not dva.is_gone):
             events |= {n: event for n, event in dva.events.items() if n not in dva.copies}
@@ -372,7 +372,7 @@ class Run:
             self.clock.call_at(at_s + death.back_after_s, self.start_region_again, number)
 
     def end_dva(self, number: int) -> None:
-        """End a DVA, by its number among those of the regions, without a word, as by kill -9."""
+        """Kill a DVA by its number among those of the regions, without any message."""
         dva = self.dvas[id_of("dva", number)]
         if not dva.is_gone and isinstance(self.network, VirtualNetwork):
             dva.device.tell("is killed", "link")
@@ -434,14 +434,14 @@ class Run:
 
     def _reception(self, robot: str) -> Reception | None:
         """Return the radio link's quality where a robot was at the last tick of the physics."""
-        agent = self.field.robots.get(robot)  # it talks before the next one has been placed
+        agent = self.field.robots.get(robot)  # others send before this robot is placed
         if agent is None:
             return None
         here = self.stage.site.link_quality(agent.body.x, agent.body.y)
         return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
-        """Return the link from one to another and the one back, as far as they are not parted."""
+        """Return the links between two nodes, there and back, with their partitions."""
         links = self._unparted(source, destination)
         partitions = self.scenario.link.partitions
         if not partitions:
@@ -503,7 +503,7 @@ class Run:
             observer.deafened(self.clock.now, robot, deaf)
 
     def slowed(self, processing: float) -> None:
-        """Let a message take a robot's computer so long on average from now on [s]."""
+        """Note the mean processing time of a message by a robot's computer from now on [s]."""
         for observer in self._observers:
             observer.slowed(self.clock.now, processing)
 
@@ -534,12 +534,12 @@ class Run:
             observer.moves(now, motions)
 
     def show_page(self) -> None:
-        """Let all observers see the DVA's book as it is now."""
+        """Show all observers the current table of each DVA."""
         for page in map(page_of, self.dvas.values()):
             for observer in self._observers:
                 observer.shows(self.clock.now, page)
 
     def _sample(self) -> None:
-        """Note where everybody is who is on the site."""
+        """Record the positions of all robots and people on the site."""
         for name, point in self.field.whereabouts(self.clock.now):
             self.recorder.tracks[name].append(point)

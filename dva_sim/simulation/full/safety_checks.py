@@ -1,10 +1,10 @@
-"""An audit of the safety rules from outside: what it can see itself, it takes from no message.
+"""Audit of the safety rules from outside: it observes what it can instead of trusting messages.
 
-It takes the facts of a run (`observations`): so it knows which permissions the DVA really gave,
-when a robot learnt that one is over, and when an emergency reached it; how bodies move, and what
-motors are asked for; every command that a robot accepted from any sender, and every hand that
-drove one at the robot itself. `CHECKED` says which rules it holds that against. Nothing of a run
-is asked for anything else, so that a recording can be judged as the run itself was.
+It takes the facts of a run (`observations`): the permissions that the DVA really gave, when a robot
+learnt that one is over, and when an emergency reached it; how bodies move, and the set points of
+their motors; every command that a robot accepted, and every manual drive at the robot itself.
+`CHECKED` lists the rules. It uses nothing else of a run, so that a recording can be judged like the
+run itself.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from dva_sim.simulation.full.regional_checks import RegionalRules
 from dva_sim.simulation.full.takeovers import Takeovers
 from dva_sim.worlds.bodies import G
 
-MOVING = 0.05  # above this a robot is going somewhere [m/s]
-TURNING = 0.1  # above this it turns [rad/s]
-SLACK = 1.02  # measured speeds may exceed a limit by so much
-OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
-ROUNDED = 0.002  # of ticks [s]
-RESTARTED = 10.0  # a robot whose clock has jumped that much [s]
-LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
-LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
-TELLS_WITHIN = 2.0  # a stopped robot tells the DVA so each second [s]
-ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
-MAX_COPIES = 8  # of one command, and registrations of a robot, that are told apart
-MAX_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
+MOVING = 0.05  # a faster robot counts as moving [m/s]
+TURNING = 0.1  # a faster one counts as turning [rad/s]
+SLACK = 1.02  # factor by which measured speeds may exceed a limit
+OBEYS_WITHIN = 5.0  # time to obey a message, on top of ten messages' processing [s]
+ROUNDED = 0.002  # rounding error of ticks [s]
+RESTARTED = 10.0  # a robot whose clock has jumped by this much has restarted [s]
+LEASE = 30.0  # time without a valid command after which a drive ends [s]
+LEASE_SLACK = 2.0  # tolerance: a robot checks the lease once a second, the audit twice [s]
+TELLS_WITHIN = 2.0  # a stopped robot reports that to the DVA every second; tolerance included [s]
+ENDLESS = 3600.0  # a set point valid for this long counts as unlimited [s]
+MAX_COPIES = 8  # maximum copies of a command, and registrations of a robot, that are told apart
+MAX_KEPT = 1000  # maximum latest messages to a robot, sessions and events that are kept
 
 CHECKED: Final = {
     "S1": "a robot is asked to move, and moves, by a started drive's newest command that arrived "
@@ -91,7 +91,7 @@ _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
 class Held(NamedTuple):
-    """A permission that the DVA gave: to whom, for what."""
+    """Permission that the DVA gave: its holder, level and sensors."""
 
     holder: str
     level: str
@@ -108,7 +108,7 @@ class Held(NamedTuple):
 
 
 class Unanswered(NamedTuple):
-    """A message that reached a robot, and is not answered yet; `source` has really sent it."""
+    """Message that reached a robot and is not answered yet; `source` is its true sender."""
 
     message: m.Message
     at: float
@@ -244,7 +244,7 @@ class Witness:
         return self.hand is not None and now - self.heard <= LEASE
 
     def hears(self, now: float) -> None:
-        """Note a message that counts; a hand that was silent for the lease has let go before."""
+        """Note a valid command; a manual driver that was silent for the lease has let go before."""
         if not self.in_hand(now):
             self.hand = None
         self.heard = now
@@ -286,7 +286,7 @@ class Witness:
         self.restarts_shown[sequence] = self.restarts
 
     def note_stand(self, when: float) -> None:
-        """Note that nothing from before may move it; no hand drives it any longer."""
+        """Note that no earlier order may move the robot; any manual control ends."""
         self.stopped = max(self.stopped, when)
         self.hand = None
 
@@ -698,7 +698,7 @@ class SafetyAudit:
         witness.newest = (source, session), number
         witness.hears(command.time)
         copies = witness.arrivals.pop((source, number, session), (command.arrived,))
-        # Where newer commands replace those that wait, a copy replaces the one that came first.
+        # Where newer commands replace waiting ones, a copy replaces the first arrival.
         known_by = (when for when in copies if when <= command.arrived + ROUNDED)
         arrived = max(known_by, default=copies[0])
         witness.allowed = arrived + self._watchdog
@@ -714,7 +714,7 @@ class SafetyAudit:
             self._report(breaches, command.time, command.robot)
 
     def by_hand(self, done: ByHand) -> None:
-        """Note that somebody drives a robot at the robot itself: no message tells of that."""
+        """Note manual control at the robot itself, which no message reports."""
         witness = self.witness(done.robot)
         now = done.time
         breaches = list[Broken]()
@@ -771,7 +771,7 @@ class SafetyAudit:
             self._report([*self._regional.shows(now, page)], now, page.dva)
 
     def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
-        """Yield robots that are handed over before they stand and know that they are."""
+        """Yield robots that are handed over while they move or before they know of it."""
         for right, session in self._takeovers[page.dva].given(page.rights, now, page.works):
             witness = self.witness(right.robot)
             motion = self._motion_of(right.robot)
@@ -783,7 +783,7 @@ class SafetyAudit:
                 yield "S2", f"{to} while it moves at {_pace(motion)}"
 
     def _is_in_hand(self, robot: str, motion: RobotMotion, now: float) -> bool:
-        """Return True while somebody drives it by hand, or it still stops after that."""
+        """Return True during manual control, and while the robot stops after it."""
         witness = self.witness(robot)
         stopping = _stopping(motion, self._motors[robot])
         return witness.in_hand(now) or now <= witness.let_go + stopping
@@ -805,7 +805,7 @@ class SafetyAudit:
     def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
         """Treat a request that a robot has not answered in time as obeyed by then."""
         if not motion.powered:
-            witness.unanswered.clear()  # it has not heard them
+            witness.unanswered.clear()  # without power it has heard none of them
         if not witness.unanswered:
             return
         late = [k for k, v in witness.unanswered.items() if now > v.at + witness.obeys_within]
@@ -836,7 +836,7 @@ def offset_of(picture: Any) -> float | None:
 
 
 def _learn_from_status(witness: Witness, status: m.Message | None, now: float) -> None:
-    """Note its number, and the rough offset if it is unknown or the robot has restarted."""
+    """Note the status's number, and the clock offset if it is unknown or the robot restarted."""
     if status is None or not isinstance(status.body, m.RobotStatus):
         return
     witness.reports(status.message_id, now)
@@ -856,7 +856,7 @@ def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[
 
 
 def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Iterator[Broken]:
-    """Yield a rule that is broken where somebody gets a value of a sensor it may not read."""
+    """Yield a broken rule if a device gets a value of a sensor that it may not read."""
     if not isinstance(value, m.SensorValue):
         return
     for session in witness.confirmed:
@@ -873,9 +873,9 @@ def _mode_of(order: m.Body) -> Mode:
 
 
 def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
-    """Yield the rules that a set point of the motors breaks: too long, or after an emergency.
+    """Yield the rules broken by a set point: valid too long, or after an emergency.
 
-    Motors without power obey none, and what was sent meanwhile has reached nobody.
+    Motors without power obey none, and messages sent meanwhile have not been received.
     """
     until = motion.asked_until
     is_sent = motion.mode == Mode.MISSION and witness.may_be_on_a_mission(now)
@@ -897,7 +897,7 @@ def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterato
 def broken_by_moving(
     witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
 ) -> list[Broken]:
-    """Return rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
+    """Return the rules broken by a robot's motion now; the motion of a pushed robot breaks none."""
     speed = motion.speed
     turn_rate = motion.turn_rate
     breaches: list[Broken] = []
@@ -930,7 +930,7 @@ def _pace(motion: RobotMotion) -> str:
 
 
 def _is_within(speed: float, turn_rate: float, limits: MotorLimits) -> bool:
-    """Compare such that a nan fails, too; nobody drives backwards."""
+    """Return True within the limits, without driving backwards; NaN is outside."""
     forward = -MOVING <= speed <= limits.max_speed * SLACK
     return forward and abs(turn_rate) <= limits.max_turn_rate * SLACK
 
@@ -953,9 +953,9 @@ def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:
 
 
 def _pushed(motion: RobotMotion, limits: MotorLimits, now: float) -> bool:
-    """Return True while a robot that another one pushed has not been stopped by its brakes.
+    """Return True while the brakes of a pushed robot have not stopped it yet.
 
-    One that was pushed backwards on its way is stopped by its motors, which speed up half as hard.
+    A robot pushed backwards during a drive is stopped by its motors, with half the deceleration.
     """
     times = 2 if motion.speed < -MOVING else 1
     return motion.touched + times * _stopping(motion, limits) >= now

@@ -18,8 +18,8 @@ from dva_sim.simulation.scenario import Scenario
 
 Outcome = Literal["", "arrived", "lost"]
 
-PERMISSION_WAIT_S = 60.0  # for the permission, the robot's answer and its first picture [s]
-LOOK = 0.1  # between looks for them [s]
+PERMISSION_WAIT_S = 60.0  # maximum wait for permission, answer and first picture of the robot [s]
+LOOK = 0.1  # interval of checks for them [s]
 
 
 class SteppedDrive:

@@ -9,7 +9,7 @@ from dva_sim.core.handovers import STOP_WITHIN
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Right
 
-MAX_KEPT = 1000  # wishes that wait for an answer
+MAX_KEPT = 1000  # maximum requests that wait for an answer
 
 
 class Stopping(NamedTuple):

@@ -40,17 +40,17 @@ from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.site import FOOTPRINT
 
 TRIES = 200
-START_GAP_M = 1.5  # between the middles of two who begin [m]
+START_GAP_M = 1.5  # minimum distance between two starting positions [m]
 
 Point = tuple[float, float]
 WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
 SLIPPERY_DEPTH_M = 0.002  # deeper water than this makes a floor slippery [m]
-HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
-CHARGING_WITHIN_M = 0.5  # so near its base a robot that stands is charged [m]
-STANDING = 0.02  # slower than this it stands [m/s]
-PLACES = 3  # where a bystander works, by turns
-FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
-FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
+HOUSEKEEPING = 1.0  # interval of checks of a robot's battery and of the floor under it [s]
+CHARGING_WITHIN_M = 0.5  # a standing robot this near its base is charged [m]
+STANDING = 0.02  # a slower robot stands [m/s]
+PLACES = 3  # number of places where a bystander works in turn
+FLAMES_SEEN = 15.0  # distance at which flames are seen with a clear line of sight [m]
+FLAMES_THROUGH = 8.0  # optical depth at which smoke hides glowing things (T. Jin, SFPE Handbook)
 
 
 class TeamBuilder:

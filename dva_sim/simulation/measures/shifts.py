@@ -37,8 +37,8 @@ from dva_sim.statistics import Incidence, first_of, incidence
 FOLLOW_S = 600.0
 FATES = ("confirmed", "refuted", "escalated", "expired")
 PERCENTILES = (50, 90, 95)
-MIN_IN_ZONE = 3  # events without which a zone's mean says nothing
-SLACK = 1e-6  # [s]
+MIN_IN_ZONE = 3  # minimum events for the mean of a zone
+SLACK = 1e-6  # rounding error of times [s]
 
 _OF_CONTAINMENT = (
     Measure("contained_share", "share of the true events contained by T", better="large"),

@@ -26,13 +26,22 @@ from dva_sim.simulation.measures.commands import Floats, Row, mean
 
 Span = tuple[float, float]  # from when to when [s]
 
-GAP = 0.1  # a smaller change of the turn rate is no reversal [rad/s]; assumed
-STEP = 0.15  # of resampling for the entropy, as published [s]
-BAND = 0.05  # of prediction errors, see `steering_entropy` [rad/s]; assumed
-EDGES = (-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0)  # of the nine bins, in bands, as published
-TRACK_STEP = 0.5  # between the points of a track that was not filmed [s]
-LEVEL_SPEED = 0.025  # half a step of the phone
-LEVEL_TURN = 0.035  # two degrees a second
+GAP = 0.1  # smallest change of the turn rate that counts as a reversal [rad/s]; assumed
+STEP = 0.15  # resampling step of the entropy, as published [s]
+BAND = 0.05  # unit of prediction errors, see `steering_entropy` [rad/s]; assumed
+EDGES = (
+    -5.0,
+    -2.5,
+    -1.0,
+    -0.5,
+    0.5,
+    1.0,
+    2.5,
+    5.0,
+)  # edges of the nine bins in bands, as published
+TRACK_STEP = 0.5  # interval of the points of a track that was not filmed [s]
+LEVEL_SPEED = 0.025  # speed below which the phone counts as level: half a step [m/s]
+LEVEL_TURN = 0.035  # turn rate below which it counts as level: two degrees a second [rad/s]
 
 
 # --- columns -----------------------------------------------------------------------------------

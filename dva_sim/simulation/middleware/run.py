@@ -22,8 +22,8 @@ from dva_sim.network.workload import FileNotes, Note
 from dva_sim.serving.processes import Child, end_all
 from dva_sim.simulation.middleware.scenario import MiddlewareScenario
 
-LINGER_S: Final = 0.2  # the robot still hears what was sent last
-PATIENCE_S: Final = 10.0  # for the operator's program to end
+LINGER_S: Final = 0.2  # time in which the robot still receives the last messages [s]
+PATIENCE_S: Final = 10.0  # time for the operator's program to end [s]
 
 
 class Window(NamedTuple):

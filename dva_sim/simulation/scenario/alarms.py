@@ -16,7 +16,7 @@ from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import Scenario, site_of
 from dva_sim.worlds.site import Site
 
-FITS_M = 0.4  # radius that must fit where an event is, so that a robot can get near
+FITS_M = 0.4  # radius that must fit at an event, so that a robot can get near [m]
 
 
 def table_of(scenario: Scenario) -> EventTableConfig | None:

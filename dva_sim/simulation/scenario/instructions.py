@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 from dva_sim.kernel.errors import ConfigError
 
 MAX_LINES: Final = 64
-MAX_LINE: Final = 256  # characters
+MAX_LINE: Final = 256  # maximum characters of a line
 _STEP: Final = re.compile(r"(?:[-*+]|\d{1,2}[.)])\s+(?:\[[ xX]?\]\s*)?(.*)")
 
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dva_sim.agents.tilt import PhoneProfile
 
 
-_OPTION = re.compile(r"option '([^']+)'")  # as those who make things by name say it
+_OPTION = re.compile(r"option '([^']+)'")  # form in which factories name a wrong option
 _IN_FILES = (
     (None, "pattern"),
     ("dispatch", "policy"),

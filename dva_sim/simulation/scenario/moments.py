@@ -11,7 +11,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import guess
 from dva_sim.kernel.table_files import Cell
 
-_MILLISECONDS: Final = 1e11  # since 1970; as seconds the year 5138
+_MILLISECONDS: Final = 1e11  # larger numbers are milliseconds since 1970; as seconds, the year 5138
 _DAY: Final = len("2026-03-01")
 _FORMS: Final = "ISO 8601, such as 2026-03-01T08:00:00+01:00, or seconds"
 

@@ -14,8 +14,8 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.scenario.parts import RegionConfig
 from dva_sim.worlds.site import FOOTPRINT, Site
 
-OVERLAP: Final = 0.05  # regions whose borders were drawn by hand may share so much ground [m2]
-IN_A_WALL: Final = 0.75  # a free place so far from all regions stands in a door, say [m]
+OVERLAP: Final = 0.05  # ground that regions with borders drawn by hand may share [m2]
+IN_A_WALL: Final = 0.75  # a free place this far from all regions stands in a door, for example [m]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from dva_sim.simulation.scenario.scenario import (
 )
 
 TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
-USUAL_S = 9.0  # time-out, where the link leaves time for an answer
+USUAL_S = 9.0  # default time-out, if the link leaves time for an answer [s]
 MAX_TIMEOUT_S = 120.0
-_ROOM = 1.25  # over what is needed, beyond the usual
+_ROOM = 1.25  # factor on the time needed, if that exceeds the default
 
 
 def time_out_s(needed_s: float) -> float:

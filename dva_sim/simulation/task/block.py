@@ -32,11 +32,11 @@ from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, WayKept
 
 Floats = NDArray[np.float64]
 
-RUN_OUT = 2.0  # the way goes on so far beyond the end, so that nobody stops before it [m]
+RUN_OUT = 2.0  # length of the path beyond the end, so that nobody stops before it [m]
 LAP_SHARE = (
     0.25  # of the tunnel one looks for one's place ahead of the last: laps lie on each other
 )
-CORNERS = 60  # of the polygon that stands for the middle of a circle, for the person
+CORNERS = 60  # corners of the polygon that represents a circle for the person
 
 
 class TunnelGoal(Goal):
@@ -127,9 +127,9 @@ class TunnelGoal(Goal):
 
 
 Row = dict[str, Any]
-PRACTISED = 5  # trials after which a person has its own tempo; assumed
-REACTIONS = 0.35  # standard deviation of the log of how long seeing and reacting take; fitted (C4)
-PAUSE = 1.0  # between two trials, nothing is done [s]
+PRACTISED = 5  # trials after which a person has found a tempo; assumed
+REACTIONS = 0.35  # standard deviation of the logarithm of reaction times; fitted (C4)
+PAUSE = 1.0  # pause between two trials [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 
 

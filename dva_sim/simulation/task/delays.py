@@ -17,8 +17,8 @@ from dva_sim.network.link import Link, make_serialiser
 from dva_sim.simulation.task.scenario import OneWayDelay
 
 T = TypeVar("T")
-ROUNDING_S = 1e-9  # what is due now comes now, whatever the rounding [s]
-SIZE = 100  # of a reading or frame [B]: the line is so fast that it does not matter
+ROUNDING_S = 1e-9  # tolerance by which an item counts as due [s]
+SIZE = 100  # size of a reading or frame; the line is so fast that it does not matter [B]
 
 
 class Channel(Generic[T]):

@@ -26,8 +26,8 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.plants import Pair, clamped, keep_of, noise_of, shaken
 from dva_sim.simulation.task.scenario import DeviceConfig
 
-HAND_SPEED = 1.0  # the fastest that a hand moves a mouse [m/s]; assumed
-CALIBRATING = 20  # samples
+HAND_SPEED = 1.0  # highest speed of a hand that moves a mouse [m/s]; assumed
+CALIBRATING = 20  # samples of a calibration
 
 
 class HandDevice(ABC):

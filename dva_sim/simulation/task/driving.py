@@ -29,14 +29,14 @@ from dva_sim.simulation.task.scenario import TaskScenario
 from dva_sim.simulation.task.tasks import Corner, Course, HeadingStep, Slalom, Task
 from dva_sim.simulation.task.trial import Seat, Trial, WayKept
 
-RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
-ENDLESS = 1000.0  # length of a way that nobody comes to the end of [m]
-MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
-CONE = 0.1  # radius in a picture [m]
-REACHED = 0.9  # share of its first peak at which it has grown: the rest is noise; assumed
-ONSET = 0.1  # share of its first peak at which a correction has begun; assumed
-SMOOTHED = 0.15  # over so long steering is averaged before it is looked at [s]; assumed
-CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
+RUN_OUT = 5.0  # length of the path beyond the finish, so that nobody stops before it [m]
+ENDLESS = 1000.0  # length of a path whose end nobody reaches [m]
+MACHINE_LOOK = 1.0  # look-ahead of a machine that steers by itself [m]; assumed
+CONE = 0.1  # radius of a cone in a picture [m]
+REACHED = 0.9  # share of the first peak that counts as grown, as the rest is noise; assumed
+ONSET = 0.1  # share of the first peak at which a correction counts as begun; assumed
+SMOOTHED = 0.15  # time over which steering is averaged before it is analysed [s]; assumed
+CONE_STEP = 0.1  # distance between the corners of the line that represents a slalom [m]
 Points = list[Pair]
 
 

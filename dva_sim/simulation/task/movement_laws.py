@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-WIDTH_PER_SD = 4.133  # the middle 96 % of a normal law: what an effective width holds
+WIDTH_PER_SD = 4.133  # effective width per standard deviation: the middle 96 % of a normal law
 
 
 def fitts_id(amplitude: float, width: float) -> float:
@@ -158,7 +158,7 @@ def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
     return best
 
 
-SMALL = 0.2  # what stays below this share of the largest is no peak
+SMALL = 0.2  # share of the largest peak below which a peak does not count
 
 
 def first_above(values: Sequence[float], level: float) -> int:

@@ -37,8 +37,8 @@ from dva_sim.simulation.task.scenario import TaskScenario
 from dva_sim.simulation.task.tasks import Pointing, ReachTask
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
-MOVED_BY = 1e-3  # a cursor that has gone so far has moved [m]; assumed
-SUMMED = 0.1  # over so long vision sums motion before it tells a velocity [s]
+MOVED_BY = 1e-3  # distance by which a cursor counts as moved [m]; assumed
+SUMMED = 0.1  # time over which vision sums motion into a velocity [s]
 
 
 class Places(NamedTuple):

@@ -21,7 +21,7 @@ from dva_sim.simulation.task.tasks import VEHICLES, NonNegative, Pointing, Reach
 
 T = TypeVar("T")
 Positive = Annotated[float, Field(gt=0)]
-FASTEST_LINE = 1e12  # [bit/s]: what is sent here is a few numbers, so its length costs no time
+FASTEST_LINE = 1e12  # rate of a line on which the size of a message costs no time [bit/s]
 
 
 class OneWayDelay(Config):

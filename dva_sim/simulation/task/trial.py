@@ -29,9 +29,9 @@ from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 
 S = TypeVar("S")  # what a frame shows
 
-WAIT_FROM = 0.1  # who wants nothing for so long waits [s]; assumed
-MACHINE_GAIN = 2.0  # of a machine that corrects by itself [rad/s]; assumed
-TRACE_EVERY = 0.02  # [s]
+WAIT_FROM = 0.1  # a person who commands nothing for this long is waiting [s]; assumed
+MACHINE_GAIN = 2.0  # gain of a machine that corrects by itself [rad/s]; assumed
+TRACE_EVERY = 0.02  # interval of a trace [s]
 
 
 @dataclass

@@ -160,7 +160,7 @@ class Operator:
         return robot.order(body, self.device)
 
 
-ADDRESS = "192.168.1.9"  # in the registration, where nobody has a real one
+ADDRESS = "192.168.1.9"  # address in registrations, where no device has a real one
 FASTEST = 2.0  # upper bound of a person's speed, by the group's mean
 SLOWEST = 0.5  # lower bound of a person's speed, by the group's mean
 IDS = {"guard": 1, "robot": 2, "operator": 3, "caller": 4, "second": 5}

@@ -16,7 +16,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.timed.distributions import Constant, Law
 
 BLOCK = 256
-KEPT_BLOCKS = 8  # blocks; events are asked about roughly in their order
+KEPT_BLOCKS = 8  # blocks kept: events are queried roughly in their order
 
 T = TypeVar("T")
 

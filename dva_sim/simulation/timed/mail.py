@@ -12,10 +12,10 @@ from dva_sim.core.sessions import Send
 from dva_sim.kernel.clock import Clock
 from dva_sim.protocol import messages as m
 
-TICK = 1.0  # how often the core looks by itself on a network [s]
+TICK = 1.0  # interval at which the core checks deadlines by itself on a network [s]
 DVA = "02:00:00:00:00:01"
-NOON = "12:00:00"  # for people, who are not here to read it
-CLOCK_STEP_S = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
+NOON = "12:00:00"  # time of day in messages, which nobody reads
+CLOCK_STEP_S = 1e-6  # resolution of the clock: no deadline is checked twice at one time [s]
 
 
 class Taker(Protocol):

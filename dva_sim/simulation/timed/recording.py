@@ -79,7 +79,7 @@ COUNT = 1
 SUM = 1 + len(MEASURES)
 SQUARES = 1 + 2 * len(MEASURES)
 CELL = 1 + 3 * len(MEASURES)
-NO_WAIT_S = 1e-9  # shorter waits are none [s]
+NO_WAIT_S = 1e-9  # shorter waits count as none [s]
 _NAN = math.nan
 
 

@@ -100,7 +100,7 @@ class Leg:
 
 
 DONE = "done"
-ROUNDING = 2e-6  # of the clock [s]
+ROUNDING = 2e-6  # rounding error of the clock [s]
 
 
 class Unit:

@@ -38,8 +38,8 @@ from dva_sim.simulation.timed.responders import Job, Unit
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.travel import Occurrence, Place, Terrain, terrain_of
 
-SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
-CHECKS = 64  # of the balance in a run
+SLACK = 1e-3  # tolerance of deadlines: the clock's step [s]
+CHECKS = 64  # checks of the balance in a run
 CHECKED_OF_SHIFTS = f"S6 checked {CHECKS} times, S7 at the end of each event; slack {SLACK:g} s"
 
 

@@ -34,8 +34,8 @@ class Occurrence(Protocol):
     index: int
 
 
-PLACE_STEP_DEG = 1e-10  # between events at one place, so that each position is one event's [deg]
-EVENT_STEP_DEG = 1e-5  # where place does not matter, so that nobody takes two events for one [deg]
+PLACE_STEP_DEG = 1e-10  # offset between events at one place, which makes positions unique [deg]
+EVENT_STEP_DEG = 1e-5  # offset where places do not matter, so that no two events are merged [deg]
 NUMBERED = 4096  # positions at one place before they repeat
 
 
@@ -289,8 +289,8 @@ def terrain_of(scenario: TimedScenario) -> Terrain:
 
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
-MAX_PATHS = 5000  # kept at a time
-FOUND = 3600.0  # what no detector notices people do, after so long [s]; assumed
+MAX_PATHS = 5000  # maximum paths kept at a time
+FOUND = 3600.0  # time after which people notice what no detector does [s]; assumed
 WALL = 0.05  # thickness of a wall [m]
 PASSAGE = 0.6  # least width to pass [m]
 

@@ -19,13 +19,13 @@ from dva_sim.worlds.site import Site
 
 OPEN_AIR = np.uint32(1 << 24)
 
-HORIZON = 60.0  # floors and ceilings end there [m]
-MIDDLE = 5.0  # from here on coarser cells do [m]
-DISTANT = 16.0  # from here on still coarser cells do [m]
-TILE = 1.0  # of a floor [m]
-JOINT = 0.035  # of a floor [m]
-HAZE = 250.0  # daylight falls off to a half over this distance [m], assumed
-LAMPS = 3.0  # about so far apart [m]
+HORIZON = 60.0  # distance at which floors and ceilings end [m]
+MIDDLE = 5.0  # distance from which coarser cells suffice [m]
+DISTANT = 16.0  # distance from which still coarser cells suffice [m]
+TILE = 1.0  # side of a floor tile [m]
+JOINT = 0.035  # width of the joint between tiles [m]
+HAZE = 250.0  # distance over which daylight falls to a half [m]; assumed
+LAMPS = 3.0  # approximate distance between lamps [m]
 
 GRASS = (142, 160, 120)
 PAVING = (206, 202, 192)

@@ -28,13 +28,13 @@ from dva_sim.worlds.site import Site
 
 Picture = NDArray[np.uint8]
 
-EYE_HEIGHT = 1.1  # of the lens above the floor [m], assumed
+EYE_HEIGHT = 1.1  # height of the lens above the floor [m]; assumed
 FIELD_OF_VIEW = math.radians(70.0)
-DUSK = 28.0  # light falls off to a half over this distance [m]
-GLOWING = 1.7  # flames are so much brighter than paint, and outshine some smoke; assumed
-CLOSEST = 0.25  # what stands nearer to the lens is not drawn [m]
-LIGHT_REACH = 9.0  # of a fire [m], assumed
-MIRROR = 0.85  # share that water mirrors at a grazing angle, assumed
+DUSK = 28.0  # distance over which light falls to a half [m]
+GLOWING = 1.7  # brightness of flames relative to paint, seen through some smoke; assumed
+CLOSEST = 0.25  # nearer objects are not drawn [m]
+LIGHT_REACH = 9.0  # reach of the light of a fire [m]; assumed
+MIRROR = 0.85  # share of light that water mirrors at a grazing angle; assumed
 
 
 class Camera:

@@ -14,13 +14,13 @@ from dva_sim.worlds.site import Site
 
 Colours = NDArray[np.uint32]
 
-ACCENTS = 12  # different colours of rooms
-MAX_CELLS = 4_000_000  # of a floor
-BORDER = 1.0  # of unknown ground around a site [m]
-BLOCK = 16  # cells; floors are made of whole blocks, so that coarser ones fit
-FACADE = (0.74, 0.60, 0.50)  # from outside
-PLAIN = (0.66, 0.68, 0.70)  # of bare maps
-GOLDEN = 0.61803399  # steps of the hue, so that neighbours differ
+ACCENTS = 12  # number of different room colours
+MAX_CELLS = 4_000_000  # maximum cells of a floor
+BORDER = 1.0  # width of unknown ground around a site [m]
+BLOCK = 16  # cells per block; floors consist of whole blocks, so that coarser cells fit
+FACADE = (0.74, 0.60, 0.50)  # colour of facades from outside
+PLAIN = (0.66, 0.68, 0.70)  # colour of bare maps
+GOLDEN = 0.61803399  # step of the hue, so that neighbours differ
 
 
 def pack(colours: Any) -> Colours:

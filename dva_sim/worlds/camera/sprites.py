@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 SCALE = 120  # pixels per metre of a finished sprite
-FINER = 4  # so many times larger is it drawn, for smooth edges
+FINER = 4  # factor by which sprites are drawn larger, for smooth edges
 
 CLOTHES = (
     ((166, 60, 58), (58, 62, 84)),

@@ -20,14 +20,14 @@ from dva_sim.worlds.site_parts import DOOR_HEIGHT
 Floats = NDArray[np.float32]
 Ints = NDArray[np.intp]
 
-SOLID_HEIGHT = 1.8  # of shelves and machines [m], assumed
+SOLID_HEIGHT = 1.8  # height of shelves and machines [m]; assumed
 POSTS = 4  # upright parts of a door frame
 POST = 0.08  # width of a door post [m]
-REVEAL = 0.07  # how far a door frame stands out of the wall on both sides [m]
-SHORT = 0.6  # shorter pieces of wall, as bare maps have them, make no corners [m]
-HANGING = 0.04  # so much behind a wall it still counts as on it [m]
-NEAR_PLANE_M = 0.05  # what is nearer to the lens is cut off [m]
-FAR_PLANE_M = 80.0  # what is farther away is not looked for [m]
+REVEAL = 0.07  # distance by which a door frame stands out of the wall on both sides [m]
+SHORT = 0.6  # shorter pieces of wall, as on bare maps, have no drawn corners [m]
+HANGING = 0.04  # maximum distance behind a wall that still counts as on it [m]
+NEAR_PLANE_M = 0.05  # nearer parts are cut off [m]
+FAR_PLANE_M = 80.0  # farther objects are not looked for [m]
 
 WALL, FRAME, LINTEL, SOLID, LEAF, NOTHING = range(6)
 

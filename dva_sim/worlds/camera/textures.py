@@ -28,14 +28,14 @@ BASE = (42, 104, 176)
 POST = (54, 128, 62)
 
 
-TEXELS = 128  # of a wall, from the floor to the ceiling
-PANEL = 1.2  # a wall has a joint every so often [m]
+TEXELS = 128  # texels of a wall from the floor to the ceiling
+PANEL = 1.2  # distance between joints of a wall [m]
 PANEL_COLUMNS = 32
-WINDOW = 2.4  # and an outer wall a window [m]
+WINDOW = 2.4  # distance between windows of an outer wall [m]
 WINDOW_COLUMNS = 64
-SIGN_COLUMNS = 96  # of a lintel, from post to post
-BESIDE_WALL_M = 0.15  # so far on both sides of a wall its rooms are looked for [m]
-BEHIND_DOOR_M = 0.4  # so far behind a door its room is looked for [m]
+SIGN_COLUMNS = 96  # texels of a lintel from post to post
+BESIDE_WALL_M = 0.15  # distance on both sides of a wall at which its rooms are looked up [m]
+BEHIND_DOOR_M = 0.4  # distance behind a door at which its room is looked up [m]
 
 WOOD = (138, 98, 60)
 PLASTER = (226, 225, 220)

@@ -11,12 +11,13 @@ from dva_sim.worlds.hazards import Raster
 
 Floats = NDArray[np.float32]
 
-SMOKE = np.array([112, 110, 108], dtype=np.float32)  # lit by lamps, assumed
-GAIN = np.array([0.75, 0.12, -0.4], dtype=np.float32)  # of red, green, blue by firelight; assumed
-GLOW_REACH = 1.6  # half of the firelight is left there [m], assumed
-SAMPLES = 64  # of the air along each ray
-REACH = 32.0  # beyond this the air is taken to be as it is there [m]
-MIRRORING_DEPTH_M = 0.003  # from this depth on a floor mirrors [m]
+SMOKE = np.array([112, 110, 108], dtype=np.float32)  # colour of smoke under lamps; assumed
+# Gain of red, green and blue in firelight; assumed.
+GAIN = np.array([0.75, 0.12, -0.4], dtype=np.float32)
+GLOW_REACH = 1.6  # distance at which half of the firelight is left [m]; assumed
+SAMPLES = 64  # samples of the air along each ray
+REACH = 32.0  # distance beyond which the air counts as uniform [m]
+MIRRORING_DEPTH_M = 0.003  # depth of water from which a floor mirrors [m]
 WATER = np.array([92, 128, 160], dtype=np.float32)
 
 

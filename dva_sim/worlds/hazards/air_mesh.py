@@ -22,9 +22,9 @@ from dva_sim.worlds.maps import FREE, OccupancyGrid
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-MIXED_HEIGHT = 3.0  # the jet of a leak mixes the air up to the ceiling [m]; assumed
+MIXED_HEIGHT = 3.0  # height up to which the jet of a leak mixes the air [m]; assumed
 CELL = 0.5  # side of a coarse cell [m]
-MAX_CELLS = 40_000  # larger houses have larger cells
+MAX_CELLS = 40_000  # maximum cells; larger houses have larger ones
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,9 @@ from dva_sim.worlds.site import Site
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-LONGEST = 12.0  # longer corridors do not fill from end to end at once: they are parted [m]
-NO_SPACE = -1  # in no space
-KEPT_PLACES = 64  # of which it is known where in the building they are
+LONGEST = 12.0  # longer corridors are divided, as they do not fill evenly from end to end [m]
+NO_SPACE = -1  # index of cells in no space
+KEPT_PLACES = 64  # places whose position in the building is cached
 
 
 @dataclass(frozen=True, eq=False)

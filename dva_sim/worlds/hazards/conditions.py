@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 from dva_sim.kernel.makers import maker
 
-AMBIENT: Final = 20.0  # temperature of the air where nothing burns [deg C]
-BREATHING_HEIGHT: Final = 1.5  # of a person's mouth and eyes [m]
+AMBIENT: Final = 20.0  # air temperature without a fire [deg C]
+BREATHING_HEIGHT: Final = 1.5  # height of a person's mouth and eyes [m]
 
 
 class Conditions(NamedTuple):

@@ -12,26 +12,26 @@ from typing import Final, NamedTuple
 
 from dva_sim.worlds.hazards.conditions import Conditions
 
-LATEST = 3600.0  # what is not noticed within an hour is not noticed by detectors [s]
+LATEST = 3600.0  # detectors notice a hazard within this time or not at all [s]
 
 DETECTORS: Final = ("smoke", "heat", "co", "gas", "water")
 
 # Smoke: an optical density of 0.14 per metre, the usual value for modelling; measured alarms
 # scatter widely around it (J. A. Geiman and D. T. Gottuk, Fire Safety Science 7 (2003) 197).
-SMOKE_ALARM = 0.14 * math.log(10.0)  # [1/m]
-SMOKE_LAYER = 0.1  # so thick must a layer be to reach into a detector [m]; assumed
+SMOKE_ALARM = 0.14 * math.log(10.0)  # extinction at which smoke detectors alarm [1/m]
+SMOKE_LAYER = 0.1  # thickness of a layer that reaches into a detector [m]; assumed
 
-HEAT_ALARM = 58.0  # rating of a heat detector [deg C]
-GAS_ALARM = 0.1  # share of the lower explosive limit that fixed detectors are usually set to
-WATER_ALARM = 5e-3  # [m]
+HEAT_ALARM = 58.0  # rated temperature of a heat detector [deg C]
+GAS_ALARM = 0.1  # usual setting of fixed detectors, as a share of the lower explosive limit
+WATER_ALARM = 5e-3  # depth of water at which a detector alarms [m]
 
 # --- carbon monoxide -------------------------------------------------------------------
 
 # The standard gives four conditions: no alarm within 120 min at 30 ppm, alarms after 60 to 90
 # min at 50 ppm, 10 to 40 min at 100 ppm, and within 3 min at 300 ppm. A dose rule
 # (c - HARMLESS)^POWER dt with an alarm at DOSE has three parameters:
-HARMLESS = 30.0  # the dose does not grow there, as at 30 ppm [ppm]
-_AT_50 = math.sqrt(60.0 * 90.0)  # the middle of the band at 50 ppm, by ratio [min]
+HARMLESS = 30.0  # concentration at which the dose does not grow [ppm]
+_AT_50 = math.sqrt(60.0 * 90.0)  # time to alarm at 50 ppm: geometric mean of the band [min]
 # 100 ppm sound within 40 min and 300 ppm within 3 min above the first power, and 100 ppm not
 # before 10 min below the second; the middle of the two is taken.
 POWER = 0.5 * (
@@ -41,7 +41,7 @@ POWER = 0.5 * (
     )
     + math.log(_AT_50 / 10.0) / math.log(70.0 / 20.0)
 )
-DOSE = 60.0 * _AT_50 * (50.0 - HARMLESS) ** POWER  # [ppm^POWER s]
+DOSE = 60.0 * _AT_50 * (50.0 - HARMLESS) ** POWER  # dose at the alarm [ppm^POWER s]
 
 
 class CoAlarm:

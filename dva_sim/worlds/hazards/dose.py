@@ -18,14 +18,14 @@ from dva_sim.worlds.hazards.fire import TENABLE_HEAT
 MINUTE = 60.0
 BREATHING = 25.0  # air breathed in light work [L/min]
 CO_LIMIT = 30.0  # carboxyhaemoglobin at which people in light work collapse [%]
-OXYGEN = 0.209  # share of the air
-MIN_OXYGEN_LACK = 0.01  # less goes unnoticed; assumed
-LUKEWARM = 60.0  # air does no harm below [deg C]; assumed
+OXYGEN = 0.209  # share of oxygen in air
+MIN_OXYGEN_LACK = 0.01  # smaller lack of oxygen has no effect; assumed
+LUKEWARM = 60.0  # temperature below which air does no harm [deg C]; assumed
 
 SMOKE_SLOWS = 0.057 / 0.706  # share of walking speed lost per 1/m of extinction, in 0.706 m/s
-CRAWLING = 0.1  # nobody gets slower in smoke than this share
-KNEE = 0.5  # water in which people walk at half their speed [m]; assumed
-WADING = 0.3  # nobody who still stands gets slower in water than this share; assumed
+CRAWLING = 0.1  # minimum share of walking speed in smoke
+KNEE = 0.5  # depth of water in which people walk at half speed [m]; assumed
+WADING = 0.3  # minimum share of walking speed in water while standing; assumed
 
 
 @dataclass

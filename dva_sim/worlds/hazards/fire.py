@@ -55,14 +55,14 @@ if TYPE_CHECKING:
 FULL_GROWTH_KW = 1055.0  # heat release that defines the growth classes [kW]
 GROWTH_S = {"slow": 600.0, "medium": 300.0, "fast": 150.0, "ultrafast": 75.0}
 HEAT_PER_AREA = 500.0  # heat release of burning floor [kW/m^2]; assumed, offices: 150 to 650
-FIRE_LOAD = 420e3  # fuel of an office, the mean [kJ/m^2]
+FIRE_LOAD = 420e3  # mean fuel load of an office [kJ/m^2]
 DECAY_FROM = 0.7  # share of the fuel burnt when the fire begins to die down
-MAX_PEAK_KW = 100e3  # assumed; beyond any building, and beyond what the field is made for
-PEAK_KW = 5000.0  # what the air through one door can burn, 1500 A sqrt(H) for 1.1 m x 2.1 m [kW]
+MAX_PEAK_KW = 100e3  # upper bound, beyond any building and the range of the model [kW]; assumed
+PEAK_KW = 5000.0  # heat released by air through one door, 1500 A sqrt(H) for 1.1 m x 2.1 m [kW]
 
-TENABLE_HEAT = 2.5  # radiant heat that skin bears for long [kW/m^2]
-MIN_DANGER = 2.0  # from flames, however small [m]; assumed
-FLAME_RATE = 8.0  # of the flickering before a camera [1/s]
+TENABLE_HEAT = 2.5  # radiant heat that skin bears for a long time [kW/m^2]
+MIN_DANGER = 2.0  # minimum dangerous distance from flames [m]; assumed
+FLAME_RATE = 8.0  # flicker rate of flames before a camera [1/s]
 
 
 def largest_peak(growth: str) -> float:
@@ -181,9 +181,9 @@ class Fire(Hazard):
 
 
 # --- ceiling jets ----------------------------------------------------------------------
-ENTRY_LENGTH = 1.8  # smoke enters a detector after the jet has gone so far [m]; assumed
-RTI = 50.0  # its response time index [(m s)^0.5]; assumed: a quick one
-NO_JET = (0.0, math.inf)  # in another room there is only the layer
+ENTRY_LENGTH = 1.8  # path of the jet until smoke enters a detector [m]; assumed
+RTI = 50.0  # response time index of a detector [(m s)^0.5]; assumed: a quick one
+NO_JET = (0.0, math.inf)  # values for another room, where there is only the layer
 
 
 def jet_warmth(heat: Floats, distance: float, ceiling: float) -> Floats:
@@ -266,9 +266,9 @@ def _jet(kind: str, growth: str, peak: float, gap: float, ceiling: float) -> tup
 
 
 # --- on a site -------------------------------------------------------------------------
-BLUR = 0.3  # the lower face of a smoke layer is so thick [m]; assumed
-RADIATION = 5.67e-11  # Stefan and Boltzmann's constant [kW/m^2/K^4]
-SMOKE_PACES = ((math.inf, 1.0),)  # in longer steps layers would swing
+BLUR = 0.3  # thickness of the lower face of a smoke layer [m]; assumed
+RADIATION = 5.67e-11  # Stefan-Boltzmann constant [kW/m^2/K^4]
+SMOKE_PACES = ((math.inf, 1.0),)  # longest step, as layers would oscillate in longer ones
 
 
 class Layer(NamedTuple):

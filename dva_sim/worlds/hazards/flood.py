@@ -25,16 +25,16 @@ from dva_sim.worlds.hazards.conditions import CLEAR, Conditions
 from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
 from dva_sim.worlds.site import Site
 
-MAX_INFLOW = 10.0  # assumed; beyond any building [m^3/s]
-INFLOW = 2e-3  # a burst pipe [m^3/s]; assumed
-FILM = 5e-3  # depth of water that spreads on a level floor [m]; about twice the capillary length
-BASIN = 50.0  # floor of a usual room [m^2]; assumed
-DOOR = 1.2  # width of its door [m]; assumed
-SILL = 0.01  # height of the threshold [m]; assumed
-WEIR = 1.705  # of a broad-crested weir, (2/3)^1.5 sqrt(g) [m^0.5/s]
-DEEP = 0.1  # water that can take a person's footing, and hides steps [m]; assumed
-MIN_DANGER = 1.0  # from the source: it is slippery, and sockets are near [m]; assumed
-FULL_VOLUME = 1.0  # counts as severity 1 [m^3]; assumed
+MAX_INFLOW = 10.0  # upper bound of the inflow, beyond any building [m^3/s]; assumed
+INFLOW = 2e-3  # inflow of a burst pipe [m^3/s]; assumed
+FILM = 5e-3  # depth at which water spreads on a level floor [m]; about twice the capillary length
+BASIN = 50.0  # floor area of a usual room [m^2]; assumed
+DOOR = 1.2  # width of the room's door [m]; assumed
+SILL = 0.01  # height of the door's threshold [m]; assumed
+WEIR = 1.705  # coefficient of a broad-crested weir, (2/3)^1.5 sqrt(g) [m^0.5/s]
+DEEP = 0.1  # depth that can take a person's footing, and hides steps [m]; assumed
+MIN_DANGER = 1.0  # minimum dangerous distance from the source: slippery floor, sockets [m]; assumed
+FULL_VOLUME = 1.0  # volume that counts as severity 1 [m^3]; assumed
 
 
 class Flood(Hazard):
@@ -86,7 +86,7 @@ class Flood(Hazard):
         return FloodField(self, site)
 
 
-EASY = 0.25  # share of the way to the same level that one step may cover
+EASY = 0.25  # share of the difference of levels that one step may cover
 
 
 class Filling:

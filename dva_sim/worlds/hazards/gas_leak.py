@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from dva_sim.worlds.camera.sprites import Sprite
 
 HOUR = 3600.0
-EDDY_DIFFUSIVITY = 0.05  # of air that ventilation stirs [m^2/s]; assumed
-AIR_CHANGES = 2.0  # of fresh air per hour; assumed
-MIN_DANGER = 1.0  # from where it leaks [m]; assumed
-FULL_CLOUD = 50.0  # a small room's air at the danger level counts as severity 1 [m^3]; assumed
+EDDY_DIFFUSIVITY = 0.05  # diffusivity of air stirred by ventilation [m^2/s]; assumed
+AIR_CHANGES = 2.0  # air changes per hour [1/h]; assumed
+MIN_DANGER = 1.0  # minimum dangerous distance from the leak [m]; assumed
+FULL_CLOUD = 50.0  # volume at the danger level of severity 1: a small room [m^3]; assumed
 
 
 class Gas(NamedTuple):
@@ -184,7 +184,7 @@ def _reach(release: float, level: float, diffusivity: float, loss: float) -> tup
     return np.r_[0.0, ages[1:]], np.r_[0.0, np.r_[0.0, radii][reached]]
 
 
-LARGE_MESH = 20_000  # nodes, of 5000 m^2 of floor
+LARGE_MESH = 20_000  # nodes of a large mesh, of 5000 m^2 of floor
 GAS_PACES = ((120.0, 2.0), (600.0, 10.0), (math.inf, 30.0))
 
 

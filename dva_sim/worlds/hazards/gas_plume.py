@@ -33,7 +33,7 @@ CLASSES = {
     "E": Spread(50.5, (22.8, 0.678, -1.3), (55.4, 0.305, -34.0)),
     "F": Spread(34.0, (14.35, 0.740, -0.35), (62.6, 0.180, -48.6)),
 }
-FITTED = 0.1  # from so far on [km]
+FITTED = 0.1  # shortest distance of the fits [km]
 
 
 def sigma_y(stability: str, distance: float) -> float:

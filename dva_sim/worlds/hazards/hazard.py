@@ -38,7 +38,7 @@ Paces = Sequence[tuple[float, float]]
 # Until which age, in which steps [s]: what has just begun changes fast.
 PACES = ((120.0, 1.0), (600.0, 2.0), (1800.0, 5.0), (math.inf, 20.0))
 
-LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]; assumed
+LARGEST = 2.5  # maximum visible radius of a leak or flood [m]; assumed
 
 
 class Hazard(Config, defer_build=False):  # its signature, which tells the settings, is built too

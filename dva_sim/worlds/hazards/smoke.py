@@ -26,23 +26,23 @@ from dva_sim.worlds.hazards.conditions import AMBIENT
 
 Floats = NDArray[np.float64]
 
-GRAVITY = 9.81  # [m/s^2]
+GRAVITY = 9.81  # acceleration of gravity [m/s^2]
 KELVIN = AMBIENT + 273.15  # temperature of the air outside the smoke [K]
 DENSITY = 353.0 / KELVIN  # of that air at sea level [kg/m^3]
-HEAT_CAPACITY = 1.005  # [kJ/kg/K]
-WALL_LOSS = 0.03  # to ceiling and walls [kW/m^2/K]; assumed: plaster board after some minutes
-DISCHARGE = 0.7  # of doorways
-SLICES = 10  # that a doorway is cut into
-HALVINGS = 10  # to find the height at which the flow turns
+HEAT_CAPACITY = 1.005  # specific heat of air [kJ/kg/K]
+WALL_LOSS = 0.03  # heat loss to ceiling and walls [kW/m^2/K]; assumed: plaster board after minutes
+DISCHARGE = 0.7  # discharge coefficient of doorways
+SLICES = 10  # slices of a doorway
+HALVINGS = 10  # bisections for the height at which the flow turns
 MAX_LEAVING_SHARE = 0.5  # share of a layer that may leave in one step
-LOWEST = 0.05  # air is still drawn in below a layer that has come down to the floor [m]
-SOOT_EXTINCTION = 8700.0  # [m^2/kg]
+LOWEST = 0.05  # height below a layer on the floor in which air is still drawn in [m]
+SOOT_EXTINCTION = 8700.0  # specific extinction of soot [m^2/kg]
 CO_RATIO = 28.96 / 28.01 * 1e6  # ppm per mass fraction
 
-RADIATIVE_FRACTION = 0.3  # of a fire's heat release; assumed, 0.3 to 0.4 is usual
-HEAT_OF_COMBUSTION = 20e3  # of wood and plastics mixed [kJ/kg]; assumed
-SOOT_YIELD = 0.05  # [kg/kg]; assumed: wood 0.015, polyurethane foam 0.13 to 0.23
-CO_YIELD = 0.02  # [kg/kg]; assumed: wood 0.004, polyurethane foam 0.01 to 0.04
+RADIATIVE_FRACTION = 0.3  # radiated share of a fire's heat release; assumed, 0.3 to 0.4 is usual
+HEAT_OF_COMBUSTION = 20e3  # heat of combustion of wood and plastics mixed [kJ/kg]; assumed
+SOOT_YIELD = 0.05  # soot per fuel [kg/kg]; assumed: wood 0.015, polyurethane foam 0.13 to 0.23
+CO_YIELD = 0.02  # carbon monoxide per fuel [kg/kg]; assumed: wood 0.004, polyurethane 0.01 to 0.04
 
 MASS, HEAT, SOOT, CO = range(4)  # columns of a state: [kg], [kJ] above ambient, [kg], [kg]
 

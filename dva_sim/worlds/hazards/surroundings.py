@@ -15,7 +15,7 @@ from dva_sim.worlds.hazards.conditions import CLEAR, QUANTITIES, Conditions, tog
 from dva_sim.worlds.hazards.hazard import Hazard, HazardField, Point
 from dva_sim.worlds.site import Site
 
-RAY = 0.25  # between the points of a line of sight [m]
+RAY = 0.25  # distance between the points of a line of sight [m]
 
 
 class Raster(NamedTuple):
