@@ -34,12 +34,12 @@ MISSION = "mission|"
 EVENT = "event|"
 AUDIT = "audit|"
 PEER_STATUS = "peer|"
-HEARTBEAT_PERIOD = 2.0  # design: [s]
-FIRST_WORD = 2.0  # design: after it a DVA that people have named is said not to answer [s]
-REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
-REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not keep [s]
-MAX_BID = 1e6  # design: no offer to go somewhere is longer [s]
-RENEW_PERIOD = 10.0  # design: from one registration to the next [s]
+HEARTBEAT_PERIOD = 2.0  # design: time between two heartbeats [s]
+FIRST_WORD = 2.0  # design: time after which a named DVA counts as not answering [s]
+REGISTER_AGAIN = 2.0  # design: pause after a registration that was refused or not answered [s]
+REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not save [s]
+MAX_BID = 1e6  # design: longest arrival time of a bid [s]
+RENEW_PERIOD = 10.0  # design: time between two registrations [s]
 
 Handler = Callable[[m.Message], m.Reply | None]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SILENT_AFTER = 10.0  # design: without a word, as the DVA waits for a device [s]
+SILENT_AFTER = 10.0  # design: silence after which the DVA counts as gone, as for devices [s]
 
 
 @dataclass(slots=True)

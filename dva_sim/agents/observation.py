@@ -19,9 +19,9 @@ from dva_sim.kernel.makers import maker
 Point = tuple[float, float]
 
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
-FRAME = "frame|"  # that topic
-IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
-CLEAR = 1000.0  # design: visibility where there is no smoke [m]
+FRAME = "frame|"  # topic of the frames
+IN_VIEW = "in view"  # end of a robot's finding while it inspects a place
+CLEAR = 1000.0  # design: visibility without smoke [m]
 SEEN_THROUGH = 3.0
 """Source: Jin: optical depth of smoke through which what does not shine is still made out. Smoke
 hides no fire: who sees it has found one."""

@@ -25,7 +25,7 @@ from dva_sim.agents.observation import Observation
 from dva_sim.agents.population import Person
 from dva_sim.kernel.makers import maker
 
-REACH = 2.0  # design: one's place on a route is looked for so far ahead of the last [m]
+REACH = 2.0  # design: distance ahead in which the next position on a route is looked for [m]
 BENT = 1.5  # design: way along a route to what one moves straight; around a right angle, up to 1.41
 
 

@@ -31,8 +31,8 @@ from dva_sim.serving.port_guard import CLIENT, PortGuard
 from dva_sim.serving.port_listener import fitting_places
 from dva_sim.serving.server import Server, serve
 
-MAX_REQUEST = 16 * 1024  # of which a path and headers consist [B]
-REPEATED = 1.0  # so often is said again who is watched [s]
+MAX_REQUEST = 16 * 1024  # maximum size of a request with its path and headers [B]
+REPEATED = 1.0  # interval at which the watched robots are repeated [s]
 NOT_KEPT = {"Cache-Control": "no-store"}
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dva_sim.serving.pipes import LineKinds, LinePipe
 from dva_sim.serving.processes import Child
 
-END_SOON = 0.8  # for one to end by itself once it is asked to: the world waits for it [s]
+END_SOON = 0.8  # time for a process to end by itself, for which the world waits [s]
 # Lines for the process that draws pictures.
 PAINTED = LineKinds(
     newest=frozenset({"frame", "picture"}), kept=frozenset({"scene", "contain", "ready"})

@@ -21,13 +21,13 @@ from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Raster, Surroundings
 
-WIDTH = 320  # [pixels]
-HEIGHT = 240  # [pixels]
+WIDTH = 320  # width of a picture [pixels]
+HEIGHT = 240  # height of a picture [pixels]
 WIDEST = 150.0  # field of view that one flat picture can show [deg]
-AIR_S = 0.5  # smoke and water are drawn as they were at the last multiple of this [s]
-HAZE = 0.005  # thinner smoke is not seen [1/m]
-BEST = 85  # quality of a JPEG
-WORST = 20  # quality of a JPEG
+AIR_S = 0.5  # interval at which smoke and water are redrawn [s]
+HAZE = 0.005  # extinction below which smoke is invisible [1/m]
+BEST = 85  # highest quality of a JPEG
+WORST = 20  # lowest quality of a JPEG
 
 Line = dict[str, Any]
 

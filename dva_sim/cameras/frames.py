@@ -10,10 +10,10 @@ from __future__ import annotations
 import json
 from typing import NamedTuple
 
-MAGIC = b'{"robot":'  # how each header begins
+MAGIC = b'{"robot":'  # beginning of each header
 JPEG_END = b"\xff\xd9"
-MAX_HEADER = 512  # bytes
-MAX_PICTURE = 1 << 20  # bytes
+MAX_HEADER = 512  # maximum size of a header [B]
+MAX_PICTURE = 1 << 20  # maximum size of a picture [B]
 ALIVE = -1  # robot number of a keep-alive record
 
 

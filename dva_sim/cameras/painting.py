@@ -16,11 +16,11 @@ from dva_sim.cameras.drawing import Eyes
 from dva_sim.cameras.frames import ALIVE, Picture, pack
 from dva_sim.serving.pipes import PipeEnd
 
-NICENESS = 3  # the run goes first
+NICENESS = 3  # lower priority: the run goes first
 ALIVE_S = 1.0  # heartbeat period [s]
 IDLE_S = 0.25  # polling period [s]
-RATE_ROOM = 1.25  # of real time: pictures of a robot in a second, of its frames in one of the run
-MIN_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
+RATE_ROOM = 1.25  # maximum rate of pictures relative to the frames of a run in real time
+MIN_RATE = 12.0  # rate of pictures of a robot that is drawn in any case [1/s]
 
 Line = dict[str, Any]
 

@@ -20,9 +20,9 @@ from dva_sim.network.messaging import Subscription, Transport
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.scenario import Scenario
 
-MAX_UNDER_WAY = 400  # frames of a robot
-PEOPLE_RANGE_FACTOR = 2.0  # how much farther than the camera's range people are drawn
-MIN_SEEN = 25.0  # people are drawn so far away in any case [m]
+MAX_UNDER_WAY = 400  # maximum frames of a robot under way
+PEOPLE_RANGE_FACTOR = 2.0  # range in which people are drawn, relative to the camera's range
+MIN_SEEN = 25.0  # distance within which people are drawn in any case [m]
 
 
 class FilmedRun(Protocol):

@@ -22,8 +22,8 @@ from dva_sim.serving.listening import listen
 from dva_sim.serving.processes import end_all
 
 MODULE = "dva_sim.cameras"
-FLUSH = 0.02  # from one try to write what waits to the next [s]
-AGAIN_AFTER = 5.0  # from the end of a process that failed until another one may begin [s]
+FLUSH = 0.02  # interval between two attempts to write waiting data [s]
+AGAIN_AFTER = 5.0  # pause after a failed process before another one starts [s]
 
 
 class CameraService:

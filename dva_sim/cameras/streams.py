@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from dva_sim.cameras.frames import ALIVE, Picture, Unpacker
 
 BOUNDARY = "dva-sim-frame"
-LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
-SILENCE = 3.0  # of who draws, after which there is no picture [s]
-STARTING = 60.0  # before the first word, which comes when the site is built [s]
-ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
+LINGERS = 1.0  # time for which a robot is still drawn after its last viewer left [s]
+SILENCE = 3.0  # silence of the drawing process after which there is no picture [s]
+STARTING = 60.0  # time until its first message, which comes when the site is built [s]
+ONE_WITHIN = 8.0  # maximum wait for a single picture [s]; links may be slow
 FRESH_FOR_S = 1.0  # a picture younger than this is returned without waiting [s]
 MAX_VIEWERS = 64
 

@@ -30,7 +30,7 @@ WORDS: Final = {
     NOT_READ: "not read",
 }
 """Words for the results; the last one that any file has is that of all."""
-_SHOWN: Final = 50  # problems of one file
+_SHOWN: Final = 50  # maximum problems shown of one file
 
 
 def check(names: Sequence[str], options: Sequence[str] = ()) -> ExitCode:

@@ -60,7 +60,7 @@ def compare(
     return ExitCode.GATE_FAILED if has_failed else ExitCode.OK
 
 
-_SHOWN = 12  # names in a line
+_SHOWN = 12  # maximum names in a line
 _MARK = "*"
 
 

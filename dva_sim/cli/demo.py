@@ -27,7 +27,7 @@ DELAY: Final = "link.delay_s=1"
 PATTERNS: Final = "req-rep,latest-wins"
 PICTURE: Final = "one-drive.png"
 FILM: Final = "one-drive.gif"
-_PATIENCE_S: Final = 300.0  # with a film that is still being made when the study is done
+_PATIENCE_S: Final = 300.0  # maximum wait for a film that is unfinished when the study is done
 _INTRODUCTION: Final = """\
 An operator drives a robot to a fire by tilting a phone. Commands go to the robot by REQ/REP, which
 waits for an answer to each, or by PUB/SUB, where the robot obeys the newest ("latest-wins").

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import typer
 
-EVERYWHERE = "0.0.0.0", "::"  # every address of this machine
+EVERYWHERE = "0.0.0.0", "::"  # addresses that stand for every address of this machine
 FORGERS = (
     "anybody who reaches it can register, read and forge messages, and stop or drive the robots"
 )

@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from dva_sim.live.foxglove_server import FoxgloveServer
 
 STORY_LINES = 12
-ALWAYS_SHOWN = "refused", "not sent", "form", "not recorded"  # in the names of counters
+ALWAYS_SHOWN = "refused", "not sent", "form", "not recorded"  # parts of names of counters
 ORDERING_WAIT_S = (
     2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
 )
-DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
-WIDTH = 80  # where there is no terminal to ask [characters]
+DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # default for a part that is run alone
+WIDTH = 80  # width without a terminal [characters]
 COLUMNS = (
     "heard\ns ago",
     "heart-\nbeats/s",

@@ -19,7 +19,7 @@ from dva_sim.options.runs import LoadOptions
 if TYPE_CHECKING:
     from dva_sim.live.load import LoadFigures
 
-DECIMALS = 6  # of a figure
+DECIMALS = 6  # decimals of a figure
 
 
 def load(options: LoadOptions, quiet: Quiet = False, as_json: Json = False) -> None:

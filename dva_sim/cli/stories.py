@@ -53,8 +53,8 @@ DRIVES = {
     "gave up": "given up",
     "refused": "ended, the robot no longer obeyed",
 }
-EVENTS = 30  # of a shift in its table; the lines below it count them all
-TRIALS = 20  # of a task in its table; likewise
+EVENTS = 30  # maximum events of a shift in its table; the lines below it count all
+TRIALS = 20  # maximum trials of a task in its table; the lines below it count all
 EVENT_HEADS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")
 COLUMNS = {
     "id_bits": "index\n[bit]",

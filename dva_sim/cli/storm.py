@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dva_sim.storms.plan import StormPlan
 
 STORMS_FOLDER = Path("results/storms")
-STORY_MARGIN_S = 20.0  # part of the story told before and after a breach [s]
+STORY_MARGIN_S = 20.0  # shown part of the story before and after a breach [s]
 _PLAN = "Saved plan of one storm, such as a failure, to replay alone."
 _HOURS = "Continue with further seeds until this many fleet-hours are reached in total."
 

@@ -33,12 +33,12 @@ from dva_sim.kernel.errors import ExitCode, error_line
 from dva_sim.kernel.wording import capital
 from dva_sim.options.studies import RunOptions, TuneOptions
 
-_LISTED_FAILURES = 5  # failures that are told one by one
-_SLOW_TO_CHECK = 500  # configurations, which take some seconds to check
-_MANY_RUNS = 100_000  # whose list takes seconds, too
-_LINE_S = 30.0  # between two lines of progress in a file
+_LISTED_FAILURES = 5  # maximum failures that are listed one by one
+_SLOW_TO_CHECK = 500  # configurations that take some seconds to check
+_MANY_RUNS = 100_000  # runs whose list takes seconds
+_LINE_S = 30.0  # interval between two lines of progress in a file
 _MINUTE_S = 60
-_SURE_AFTER_S = 10.0  # before this and the share, the first runs say little of the others
+_SURE_AFTER_S = 10.0  # before this time and share, the first runs say little about the others
 _SURE_SHARE = 0.05
 
 

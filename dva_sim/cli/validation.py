@@ -41,7 +41,7 @@ from dva_sim.validation.operators import experiments as operators
 from dva_sim.validation.operators.exact import EXACT
 from dva_sim.validation.operators.experiments import EXPERIMENTS
 
-WIDTH = 110  # of tables at least, also in a file
+WIDTH = 110  # minimum width of tables, also in a file
 _COMMANDS = ".csv.gz"  # ending of a table of commands
 _WIDTHS = {"line": 5, "claim": 6, "predicted": 4, "verdict": 6}  # shares of the width
 _STYLES = {"holds": "green", "misses": "bold red", "too rough": "yellow", "shown only": "dim"}

@@ -35,10 +35,10 @@ COLUMNS: Final = (
     "asked_speed",  # what the last action asked for, as shares of the limits
     "asked_turn",
 )
-NEAR_M = 0.8  # [m]
-FAR_M = 2.5  # [m]
+NEAR_M = 0.8  # near look-ahead on the route [m]
+FAR_M = 2.5  # far look-ahead on the route [m]
 BOUND: Final = 1e4  # bound of all observations
-ROUNDING: Final = 1e-6  # of a share at its limit, as of float32
+ROUNDING: Final = 1e-6  # rounding error of a share at its limit in float32
 
 
 class DriveEnv(gymnasium.Env[Vector, Vector]):

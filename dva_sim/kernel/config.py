@@ -24,8 +24,8 @@ from dva_sim.kernel.yaml_files import KeyPath
 
 Scalar = bool | int | float | str | None
 
-_DEPTH = 4  # of keys in keys
-_MEANT = 3  # keys of one name that are told
+_DEPTH = 4  # maximum depth of nested keys
+_MEANT = 3  # maximum keys of one name that are suggested
 _UNITS = {
     "s": "seconds",
     "m": "metres",
@@ -186,7 +186,7 @@ def _others(info: Any) -> tuple[str, ...]:
     return tuple(n for m in info.metadata if isinstance(m, AlsoCalled) for n in m.names)
 
 
-_SHOWN = 60  # characters of a value
+_SHOWN = 60  # maximum characters shown of a value
 
 # What a value should be, by what pydantic says that it is not.
 _KINDS = {

@@ -11,7 +11,7 @@ from dva_sim.kernel.config import Fail, M, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, parse_scalar
 
-_SHOWN = 80  # characters of a setting
+_SHOWN = 80  # maximum characters shown of a setting
 
 
 def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import Any, Final
 
-ACTS: Final = r"^[=+\-@\t\r]"  # what a cell begins with that does something
+ACTS: Final = r"^[=+\-@\t\r]"  # first characters that make a cell a formula
 
 
 def harmless(cell: Any) -> Any:

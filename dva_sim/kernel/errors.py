@@ -93,7 +93,7 @@ class ConfigError(DvaSimError):
 
 
 ERROR = "error: "
-_LONGEST = 160  # characters of a word
+_LONGEST = 160  # maximum characters of a word
 
 
 def error_line(problem: object) -> str:

@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Iterable
 from typing import Final
 
-LONGEST: Final = 64  # characters of a label in a message
+LONGEST: Final = 64  # maximum characters of a label in a message
 # Letters and marks that are drawn as nothing, or as a gap, though they count as printable:
 # Unicode's Default_Ignorable_Code_Point beyond the format characters, and the empty Braille cell.
 _BLANK: Final = frozenset(

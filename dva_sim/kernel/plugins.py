@@ -24,7 +24,7 @@ from dva_sim.kernel.suggestions import hint, unknown
 T = TypeVar("T")
 A = TypeVar("A")
 
-FAILURES: Final = (Exception, SystemExit)  # what is wrong with a plug-in: it may not end us either
+FAILURES: Final = (Exception, SystemExit)  # errors of a plug-in: they must not end the program
 
 LIMIT_TOLERANCE: Final = 0.02  # share of a limit by which an answer may miss it
 

@@ -12,7 +12,7 @@ from dva_sim.kernel.suggestions import guess, hint
 
 _PACKAGE = Path(__file__).parent.parent
 REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
-_RESULTS = "manifest.json"  # of a results folder
+_RESULTS = "manifest.json"  # file in a results folder
 _TEXTS: Final = (".yaml", ".yml", ".csv", ".xsd")  # files that a name may mean
 
 

@@ -9,9 +9,9 @@ from typing import Final
 from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.wording import listing
 
-_LETTERS: Final = 3  # at least, for the beginning of a name to tell which is meant
-_A_SLIP: Final = 4  # letters in which one slip is likely
-_LISTED: Final = 12  # names in one line; more are counted
+_LETTERS: Final = 3  # minimum letters of a beginning that identifies a name
+_A_SLIP: Final = 4  # letters per likely typing error
+_LISTED: Final = 12  # maximum names listed in one line
 
 
 def guess(given: str, known: Iterable[str]) -> str | None:

@@ -85,7 +85,7 @@ def _place(mark: Any) -> Place:
 
 KeyPath = tuple[str | int, ...]
 SUFFIXES = (".yaml", ".yml")
-MAX_VALUES = 20_000  # in one file
+MAX_VALUES = 20_000  # maximum values in one file
 
 
 @dataclass(frozen=True)

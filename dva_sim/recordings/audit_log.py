@@ -26,10 +26,10 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 FORMAT: Final = 1
 SUFFIX: Final = ".sqlite"
-BEGIN = "begin"  # action of the row before what one console wrote
-END = "end"  # action of the row after it
-NOTHING_BEFORE: Final = "0" * 64  # what the first row follows
-OPEN_WITHIN: Final = 2.0  # that long somebody else may have the file to itself [s]
+BEGIN = "begin"  # action of the row before those of one console
+END = "end"  # action of the row after those of one console
+NOTHING_BEFORE: Final = "0" * 64  # digest before the first row
+OPEN_WITHIN: Final = 2.0  # maximum wait for another process's lock [s]
 _TABLES = f"""
 BEGIN IMMEDIATE;
 CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);

@@ -33,7 +33,7 @@ POSE = "pose"  # last part of a topic, as the next three
 ACTIVITY = "activity"
 FIX = "fix"
 SEEN = "seen"
-ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
+ALIVE_S = 1.0  # interval at which standing bodies are recorded, on whole multiples [s]
 
 
 def poses(playback: Playback) -> Iterator[ChannelMessage]:
@@ -124,10 +124,10 @@ def _pose(name: str, what: str, p: TrackPoint) -> ChannelMessage:
 
 
 GRIDS = "/fields/"
-PERIOD_S = 2.0  # between two grids [s]
-CELL = 0.5  # [m]
-MAX_CELLS = 20_000  # of a grid; on a larger site cells are larger
-DIGITS = 11  # of the 23 binary ones of a number: one part in 4000, and half the file
+PERIOD_S = 2.0  # interval between two grids [s]
+CELL = 0.5  # side of a cell of a grid [m]
+MAX_CELLS = 20_000  # maximum cells of a grid; a larger site has larger ones
+DIGITS = 11  # binary digits kept of 23: one part in 4000, and half the file
 
 
 def grids(playback: Playback) -> Iterator[ChannelMessage]:
@@ -180,10 +180,10 @@ WALL = "#3a3f47"
 INK = "#2b3038"
 EXIT = "#2f7d32"
 BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
-TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
-PERSON = 0.25  # radius [m]
-STEP_S = 1.0  # between updates of a hazard [s]
-MIN_GROWTH = 0.05  # less is not drawn again [m]
+TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # drawn heights [m]
+PERSON = 0.25  # radius of a person [m]
+STEP_S = 1.0  # interval between updates of a hazard [s]
+MIN_GROWTH = 0.05  # least growth that is drawn again [m]
 
 
 def bodies(playback: Playback) -> Iterator[ChannelMessage]:
@@ -365,7 +365,7 @@ SCREEN = "screen"
 COMMANDS = "commands"
 CAMERA = "camera"
 APPLIED = "applied"
-LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
+LEVELS = {"safety": 3, "mode": 1, "link": 1}  # levels of Foxglove's log; all else is information
 
 
 def story_messages(playback: Playback) -> Iterator[ChannelMessage]:

@@ -11,7 +11,7 @@ from dva_sim.core.events import Choice, Event, Handling, State
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.facts import Fact
 
-ROUNDED: Final = 0.0005  # pages know moments to the millisecond [s]
+ROUNDED: Final = 0.0005  # rounding error of times on pages, in milliseconds [s]
 _STEPS: Final = (
     ("detected", State.PENDING),
     ("assigned", State.ASSIGNED),

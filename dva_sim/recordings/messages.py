@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 NS = 1_000_000_000
-FRAME = "map"  # the plane of the site: x east, y north [m]
+FRAME = "map"  # frame of the site: x east, y north [m]
 PLACES = 4  # decimals of a length [m]
 TURNS = 6  # decimals of a quaternion
-XML = "xml"  # in the place of a schema's name: the content is bytes of the protocol
+XML = "xml"  # in place of a schema's name: the content is bytes of the protocol
 
 
 class ChannelMessage(NamedTuple):

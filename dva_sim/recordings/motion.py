@@ -29,9 +29,9 @@ UNITS: Final = (
 )
 COLUMNS: Final = "t_s,came_s,at_s,x_mps2,y_mps2,z_mps2,orientation_deg"
 APP: Final = "# app "
-MAX_DURATION_S: Final = 1e6  # of a run: ten days
-STRONGEST_MPS2: Final = 1e5  # along an axis: ten times what breaks a phone
-MAX_BYTES: Final = 64_000_000  # of a file: about two hours at 60 samples a second
+MAX_DURATION_S: Final = 1e6  # maximum duration of a run: ten days
+STRONGEST_MPS2: Final = 1e5  # maximum acceleration along an axis: ten times what breaks a phone
+MAX_BYTES: Final = 64_000_000  # maximum size of a file: about two hours at 60 samples a second
 
 
 class NoMotionOfOursError(ConfigError):

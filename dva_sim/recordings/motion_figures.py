@@ -12,10 +12,10 @@ from dva_sim.agents.tilt.accelerometer import GRAVITY
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.motion import MotionSample, PhoneMotion
 
-GAP: Final = 3.0  # median intervals: a longer one is a gap
+GAP: Final = 3.0  # length of an interval that counts as a gap, in median intervals
 REST_S: Final = 2.0  # length of the quietest stretch, which counts as rest [s]
-MIN_SAMPLES: Final = 30  # samples
-MIN_STEP_S: Final = 1e-6  # between two of them: those nearer are of one moment
+MIN_SAMPLES: Final = 30  # minimum number of samples
+MIN_STEP_S: Final = 1e-6  # nearer samples count as simultaneous [s]
 
 
 class MotionFigures(NamedTuple):

@@ -13,7 +13,7 @@ from dva_sim.recordings import channels, messages
 from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, COUNTS, DIGEST, RUN, SCENARIO, digest
 
-LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
+LARGEST = 2**31  # maximum size of a record; a larger one is damaged [B]
 NO_END = "is damaged: it does not end as MCAP does"
 PACKED = {
     b"\x28\xb5\x2f\xfd": "zstd",

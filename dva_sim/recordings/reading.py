@@ -41,7 +41,7 @@ from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import KINDS, QUANTITIES, Hazard, Raster, Surroundings
 from dva_sim.worlds.site import Site
 
-MAX_LEFT_OUT = 10**6  # samples of somebody who stands: days
+MAX_LEFT_OUT = 10**6  # maximum samples left out of a standing body: days
 Records = Sequence[tuple[float, Mapping[str, Any]]]  # messages of a topic, with their times [s]
 
 

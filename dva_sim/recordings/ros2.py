@@ -20,7 +20,7 @@ from dva_sim.recordings import messages
 from dva_sim.simulation.full import Playback
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid
 
-LEVELS = {"safety": 30, "mode": 10, "link": 10}  # warning, and what is for finding mistakes
+LEVELS = {"safety": 30, "mode": 10, "link": 10}  # warning for safety, debug for the others
 INFO = 20
 
 Entry = tuple[float, str, Any]  # time [s], topic, message

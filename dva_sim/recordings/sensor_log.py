@@ -30,13 +30,13 @@ _WITHOUT_GRAVITY: Final = re.compile(r"lin(ear|[\W_]*acc)|without g|user", re.IG
 _IN_MPS2: Final = re.compile(r"m\s*/\s*s|mps2|ms-2|m s-2", re.IGNORECASE)
 _IN_G: Final = re.compile(r"\(g\)|\[g\]|_g\b|gf|g-force", re.IGNORECASE)
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-_STEPS: Final = 0.5e-3, 0.5  # between samples [s]: a factor of 1000, so one unit fits
-_AROUND_GRAVITY: Final = 0.15  # by how much the median may differ from it, as a share
+_STEPS: Final = 0.5e-3, 0.5  # range of steps between samples [s]: a factor of 1000 fits one unit
+_AROUND_GRAVITY: Final = 0.15  # maximum deviation of the median from gravity, as a share
 _AROUND_NAMED_GRAVITY: Final = 0.5  # the same where the unit is named
-_STEADY_S: Final = 1.0  # for so long gravity keeps its direction, roughly
+_STEADY_S: Final = 1.0  # time for which gravity roughly keeps its direction [s]
 _STEADY_SHARE: Final = 0.6  # of gravity, left in the mean of so long: half a turn in it leaves 0.64
 _TURNS: Final = 0.01  # difference along an axis that shows motion, as a share of gravity
-_EVEN: Final = 1e-4  # deviation of the magnitude below that of any accelerometer, likewise
+_EVEN: Final = 1e-4  # relative deviation of the magnitude below that of any accelerometer
 _INSTEAD: Final = "log acceleration with gravity (in Sensor Logger: TotalAcceleration)"
 
 

@@ -93,21 +93,22 @@ def _map_files(site: Site) -> dict[str, bytes]:
     return {f"{site.name}.yaml": text.encode(), f"{site.name}.png": picture.getvalue()}
 
 
-FORMAT = 1  # of what is attached; a reader refuses a later one
-COUNTS = "dva-sim messages"  # metadata of how many each topic has, by which filtering is found
+FORMAT = 1  # version of the attachments; a reader refuses a later one
+COUNTS = "dva-sim messages"  # metadata: messages per topic, by which filtering is detected
 ABOUT = "dva-sim"  # name of the metadata
-DIGEST = "digest"  # an entry of the metadata
+DIGEST = "digest"  # key of the metadata
 RUN = "run.json"
 SCENARIO = "scenario.json"
 TABLES = "tables.json"
 SITE = "site/"
-DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
-HELD_TO = "held_to"  # what robots are held to, where the facts are recorded that this is judged by
-SENT = ("responder", "operator", "actor")  # to an event
+# Attributes kept of a hazard whose class a reader does not load.
+DESCRIBED = ("title", "shows", "colour", "mark")
+HELD_TO = "held_to"  # key of the limits of robots, recorded together with the facts
+SENT = ("responder", "operator", "actor")  # attributes of an event that name the devices sent there
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
-SUFFIX = ".mcap"  # a recording
-PART = ".part"  # what a live run puts together until its end
-CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
+SUFFIX = ".mcap"  # ending of a recording
+PART = ".part"  # ending of what a live run assembles until its end
+CHUNK = 256 * 1024  # maximum loss in a truncated file, unpacked [B]
 
 Tables = Mapping[str, Any]
 

@@ -18,7 +18,7 @@ from dva_sim.worlds.physics import World
 STOP_REPEATED: Final = (
     1.0  # design: the stop command is repeated for this time after each drive [s]
 )
-STANDS_BELOW: Final = 0.02  # below this it counts as standing [m/s, rad/s]
+STANDS_BELOW: Final = 0.02  # a slower robot counts as standing [m/s, rad/s]
 
 
 class RosBody(RobotBody):

@@ -10,11 +10,11 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.ros.rosbridge import BadOperation, decode, encode
 from dva_sim.ros.websocket import WebSocketDialer, WebSocketUrl
 
-FIRST_PAUSE = 0.5  # design: before the second attempt to connect [s]
-MAX_PAUSE = 2.0  # design: before another attempt to connect, at most [s]
+FIRST_PAUSE = 0.5  # design: pause before the second attempt to connect [s]
+MAX_PAUSE = 2.0  # design: longest pause before another attempt to connect [s]
 SILENT_AFTER: Final = 5.0  # design: a connection over which nothing comes is given up [s]
 LARGEST: Final = 16_000_000  # design: a larger message ends the connection [B]
-MAX_QUEUED: Final = 200_000  # design: commands are not queued behind so much [B]
+MAX_QUEUED: Final = 200_000  # design: backlog behind which commands are not queued [B]
 
 
 class Subscribed(NamedTuple):

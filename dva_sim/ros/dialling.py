@@ -10,8 +10,8 @@ from typing import Final
 
 from dva_sim.network.realtime import LiveClock
 
-LOOK: Final = 0.01  # design: between two looks at whether it is connected [s]
-OPENS_WITHIN: Final = 5.0  # design: [s]
+LOOK: Final = 0.01  # design: interval of checks whether it is connected [s]
+OPENS_WITHIN: Final = 5.0  # design: time to connect [s]
 
 
 class Dialling:

@@ -10,8 +10,8 @@ from typing import Final
 
 from dva_sim.ros.profile import RosLimits
 
-DRIFT: Final = 1e-4  # design: clocks of robot and bench differ in rate by less than that
-BACKLOG: Final = 3.0  # design: with odometry that is late for so long the bridge is renewed [s]
+DRIFT: Final = 1e-4  # design: clocks of robot and bench differ in rate by less than this
+BACKLOG: Final = 3.0  # design: lateness of odometry after which the bridge is renewed [s]
 NO_ODOMETRY: Final = "no odometry has come"
 NO_BRIDGE: Final = "the bridge is not connected"
 

@@ -27,13 +27,13 @@ from dva_sim.ros.published import namespace_of
 from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.stage import Stage
 
-LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
+LOOK_AROUND: Final = 2.0  # design: interval of looks at the registered devices [s]
 MAX_ROBOTS: Final = 64
-MAX_DRIVERS: Final = 8  # clients that may be in control at a time
-SILENT: Final = 0.5  # design: a robot whose driver sends no command for that long is stopped [s]
-TAKE_TRIES: Final = 3  # design: a long link takes a permission's time to be connected over
+MAX_DRIVERS: Final = 8  # maximum clients in control at a time
+SILENT: Final = 0.5  # design: a robot without a command for this long is stopped [s]
+TAKE_TRIES: Final = 3  # design: attempts; connecting over a long link takes a permission's time
 SCAN_HZ: Final = 5.0
-RENEW: Final = 30.0  # design: of a subscription to a sensor [s]
+RENEW: Final = 30.0  # design: interval of renewals of a subscription to a sensor [s]
 LIDAR: Final = "lidar"
 
 

@@ -13,9 +13,9 @@ from urllib.parse import urlsplit
 from dva_sim.network.realtime import LiveClock
 from dva_sim.ros.dialling import Dialling
 
-AGAIN_AFTER: Final = 3.0  # design: from the end of a stream to the next attempt [s]
-MAX_PICTURE_BYTES: Final = 2_000_000  # design: of a picture with its headers [B]
-READ_BYTES: Final = 1 << 16  # [B]
+AGAIN_AFTER: Final = 3.0  # design: pause between the end of a stream and the next attempt [s]
+MAX_PICTURE_BYTES: Final = 2_000_000  # design: maximum size of a picture with its headers [B]
+READ_BYTES: Final = 1 << 16  # maximum size of a read [B]
 _LENGTH = re.compile(rb"\r\nContent-Length: (\d{1,7})\r\n", re.IGNORECASE)
 _TIME = re.compile(rb"\r\nX-Frame-Time-Ms: (\d{1,15})\r\n", re.IGNORECASE)
 

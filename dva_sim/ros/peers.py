@@ -20,12 +20,12 @@ from dva_sim.ros.websocket import TOO_SLOW, WebSocketConnection
 
 Json = dict[str, Any]
 
-PER_SECOND: Final = 200.0  # design: operations that are taken; a joystick makes 50
-BURST: Final = 400.0  # design: at once
-MAX_DROPPED: Final = 20_000  # design: operations of a flood, after which it is cut off
+PER_SECOND: Final = 200.0  # design: sustained rate of operations; a joystick makes 50 [1/s]
+BURST: Final = 400.0  # design: maximum operations at once
+MAX_DROPPED: Final = 20_000  # design: dropped operations after which a flooding peer is cut off
 MAX_TOPICS: Final = 256
-MAX_BEHIND: Final = 200_000  # design: with so much on its way a peer gets no more readings [B]
-SAY_AGAIN: Final = 5.0  # design: the same refusal is said no more often [s]
+MAX_BEHIND: Final = 200_000  # design: backlog above which a peer gets no more readings [B]
+SAY_AGAIN: Final = 5.0  # design: shortest interval between two equal refusals [s]
 EMERGENCY: Final = b"/emergency_stop"
 ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
 

@@ -14,8 +14,8 @@ from dva_sim.agents.observation import Observation
 from dva_sim.worlds.maps import OCCUPIED, UNKNOWN, OccupancyGrid
 
 MAP: Final = "map"  # the site's frame: x east, y north; odometry does not drift, so it is odom, too
-MAX_CELLS: Final = 250_000  # design: of the map; on a larger site cells are larger
-REACH_M: Final = 8.0  # of the lidar
+MAX_CELLS: Final = 250_000  # design: maximum cells of the map; a larger site has larger ones
+REACH_M: Final = 8.0  # range of the lidar [m]
 Json = dict[str, Any]
 
 

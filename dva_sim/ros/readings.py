@@ -20,12 +20,12 @@ from dva_sim.ros.profile import RosProfile
 from dva_sim.ros.rosbridge import is_finite
 
 JPEG: Final = b"\xff\xd8\xff"
-RAYS: Final = 36  # of a scan as devices get it, the first one ahead
+RAYS: Final = 36  # rays of a scan for devices, the first one ahead
 MAX_RANGES: Final = 20_000  # maximum scan readings
-FASTEST: Final = 50.0  # design: a robot that says it is faster is not believed [m/s, rad/s]
-MAX_ANGLE: Final = 10.0  # of a scan [rad]
-LATEST: Final = 1 << 40  # no time is later [s]
-FARTHEST: Final = 100_000.0  # design: nor one farther from its origin [m]
+FASTEST: Final = 50.0  # design: a higher reported speed counts as an error [m/s, rad/s]
+MAX_ANGLE: Final = 10.0  # maximum angle of a scan [rad]
+LATEST: Final = 1 << 40  # latest possible time [s]
+FARTHEST: Final = 100_000.0  # design: greatest distance of a robot from its origin [m]
 
 
 class BadReading(Exception):

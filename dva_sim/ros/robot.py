@@ -23,15 +23,15 @@ from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.worlds.drives import Differential, DriveSpec
 from dva_sim.worlds.physics import World
 
-LOOK: Final = 0.05  # design: between two looks at whether it can be driven [s]
-ODOMETRY_MS: Final = 20  # design: odometry is read no more often [ms]
-PICTURES_MS: Final = 50  # design: nor pictures [ms]
-SMALL: Final = 100_000  # design: of a message that is no picture and no scan [B]
-SCANS: Final = 1_000_000  # design: of a scan [B]
-TELL_AGAIN: Final = 10.0  # design: a refusal of the same topic is told no more often [s]
-ENABLE_AGAIN: Final = 2.0  # design: after it was refused [s]
+LOOK: Final = 0.05  # design: interval of checks whether it can be driven [s]
+ODOMETRY_MS: Final = 20  # design: shortest interval between two readings of odometry [ms]
+PICTURES_MS: Final = 50  # design: shortest interval between two pictures [ms]
+SMALL: Final = 100_000  # design: maximum size of a message other than a picture or a scan [B]
+SCANS: Final = 1_000_000  # design: maximum size of a scan [B]
+TELL_AGAIN: Final = 10.0  # design: shortest interval between two reports of one refused topic [s]
+ENABLE_AGAIN: Final = 2.0  # design: pause after a refusal [s]
 SENSOR_HZ: Final = 10.0
-RANGE_M: Final = 12.0  # assumed: of the camera; nothing in its pictures is recognised
+RANGE_M: Final = 12.0  # assumed: range of the camera; nothing in its pictures is recognised
 
 
 class RosRobot:

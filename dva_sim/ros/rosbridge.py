@@ -10,7 +10,7 @@ import json
 import math
 from typing import Any, Final
 
-MAX_NAME: Final = 256  # of a topic, a service or a type
+MAX_NAME: Final = 256  # maximum characters of the name of a topic, a service or a type
 
 
 class BadOperation(Exception):

@@ -23,16 +23,16 @@ from dva_sim.worlds.site import Site
 Json = dict[str, Any]
 Answer = Callable[[bool, Json], object]
 
-MAX_PEERS: Final = 16  # clients that may do everything; any other may only stop robots
-MAX_SERVED: Final = 32  # design: of both together
-MAX_CONNECTIONS: Final = 64  # design: the others have not shown a token yet
-STOPS = 1  # rank of a client
-DOES_ALL = 2  # rank of a client
-PING: Final = 2.0  # design: between two pings [s]
-SILENT: Final = 5.0  # design: a client from which nothing comes, not even a pong, is cut [s]
-SWEEP: Final = 1.0  # design: between two looks at silent connections [s]
-LARGEST: Final = 100_000  # design: of a message of a client; a Twist has 200 [B]
-CLOCK_PERIOD: Final = 0.1  # [s]
+MAX_PEERS: Final = 16  # maximum clients with all rights; further ones may only stop robots
+MAX_SERVED: Final = 32  # design: maximum clients of both kinds together
+MAX_CONNECTIONS: Final = 64  # design: maximum connections, including those without a token yet
+STOPS = 1  # rank of a client that may only stop robots
+DOES_ALL = 2  # rank of a client with all rights
+PING: Final = 2.0  # design: interval between two pings [s]
+SILENT: Final = 5.0  # design: a client without even a pong for this long is cut [s]
+SWEEP: Final = 1.0  # design: interval of checks for silent connections [s]
+LARGEST: Final = 100_000  # design: maximum size of a client's message; a Twist has 200 [B]
+CLOCK_PERIOD: Final = 0.1  # interval of published times [s]
 TYPES: Final = {
     "odom": "nav_msgs/Odometry",
     "scan": "sensor_msgs/LaserScan",

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from websockets.client import ClientProtocol
     from websockets.server import ServerProtocol
 
-FLUSH: Final = 0.01  # design: between two attempts to send what waits [s]
-READ_BYTES: Final = 1 << 16  # design: read before other sources have their turn [B]
-MAX_WAITING: Final = 8_000_000  # design: of a peer [B]
-LINGERS: Final = 0.5  # design: a bridge may take to read the last commands of a run [s]
-SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
+FLUSH: Final = 0.01  # design: interval between two attempts to send waiting data [s]
+READ_BYTES: Final = 1 << 16  # design: maximum read before other sources have their turn [B]
+MAX_WAITING: Final = 8_000_000  # design: maximum data waiting for a peer [B]
+LINGERS: Final = 0.5  # design: time for a bridge to read the last commands of a run [s]
+SHAKES_WITHIN: Final = 5.0  # design: time from TCP to WebSocket [s]
 NORMAL = 1000  # close code of RFC 6455
 TOO_SLOW = 1008  # close code of RFC 6455
 GOING = 1001  # close code of RFC 6455
-PORT: Final = 9090  # of rosbridge
+PORT: Final = 9090  # default port of rosbridge
 
 
 class WebSocketConnection:

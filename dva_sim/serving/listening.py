@@ -8,9 +8,9 @@ import socket
 
 from dva_sim.kernel.errors import ConfigError
 
-SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
-SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
-WAITING = 1024  # connections that are not accepted yet
+SEND_BYTES = 64 * 1024  # send buffer of each connection in the kernel: data waiting there gets old
+SILENT_MS = 20_000  # a connection that takes or answers nothing for this long is cut [ms]
+WAITING = 1024  # maximum connections waiting to be accepted
 
 
 def listen(host: str, port: int, option: str = "--port") -> socket.socket:

@@ -19,9 +19,9 @@ from typing_extensions import override
 if TYPE_CHECKING:
     import asyncio
 
-MAX_WAITING = 64  # lines
-MAX_LINE = 32 << 20  # of one that is read [B]; a scene has a few hundred thousand
-READ_BYTES = 1 << 16  # that are read [B]
+MAX_WAITING = 64  # maximum waiting lines
+MAX_LINE = 32 << 20  # maximum size of a line [B]; a scene has a few hundred thousand
+READ_BYTES = 1 << 16  # maximum size of a read [B]
 
 Line = dict[str, Any]
 

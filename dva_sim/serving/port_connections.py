@@ -12,12 +12,12 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-_LOG = logging.getLogger("uvicorn.error")  # that of the server
-MAX_CONNECTIONS = 512  # connections of a port
-MAX_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
-NEWCOMERS = 500  # design: that may cut others without a token [1/s]
-SILENT = 5.0  # without a token a connection is cut after this [s]
-IDLE = 20.0  # with one, between two requests [s]; longer than the server keeps it open itself
+_LOG = logging.getLogger("uvicorn.error")  # log of the server
+MAX_CONNECTIONS = 512  # maximum connections of a port
+MAX_SERVED = 400  # maximum connections with a token and a request; the rest are for newcomers
+NEWCOMERS = 500  # design: rate at which newcomers may displace others without a token [1/s]
+SILENT = 5.0  # time after which a connection without a token is cut [s]
+IDLE = 20.0  # the same with a token, between requests [s]; longer than the server's own time-out
 
 
 @dataclass(eq=False)

@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket
 from dva_sim.serving.admission import Admission, RequestFacts
 from dva_sim.serving.connection import place_of
 
-CLIENT: Final = 1  # rank of every client that is let in
+CLIENT: Final = 1  # rank of every admitted client
 
 
 class PortGuard:

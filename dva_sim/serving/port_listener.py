@@ -26,13 +26,13 @@ from dva_sim.serving.port_connections import (
     PortConnections,
 )
 
-ACCEPTS_PER_TURN: Final = 32  # connections accepted before the loop serves others again
-SERVED_AT_ONCE: Final = 32  # connections that have said their first word, likewise
+ACCEPTS_PER_TURN: Final = 32  # maximum connections accepted before the loop serves others again
+SERVED_AT_ONCE: Final = 32  # maximum connections with first bytes that are served before that
 HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS, where each costs a millisecond or two
-SWEEP: Final = 1.0  # from one look at silent connections to the next [s]
-PAUSE: Final = 0.2  # when no file can be opened [s]
-SPARE_FILES: Final = 128  # that are no connections: pipes, pages' files, the audit log
-SHUTDOWN: Final = 1.0  # for the end of a TLS connection [s]
+SWEEP: Final = 1.0  # interval of checks for silent connections [s]
+PAUSE: Final = 0.2  # pause when no file can be opened [s]
+SPARE_FILES: Final = 128  # files other than connections: pipes, pages' files, the audit log
+SHUTDOWN: Final = 1.0  # time for the end of a TLS connection [s]
 
 
 def fitting_places(listeners: int) -> PortConnections:

@@ -16,11 +16,11 @@ from typing import Any, TypeVar
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 
-READY_WITHIN = 30.0  # from the start of a process to its first word [s]
-END_WITHIN = 5.0  # for a process to end by itself once it is asked to [s]
-EXIT_DELAY_S = 0.8  # between the end of what a process says and its own [s]
-LOOK = 0.01  # between two looks at a process that is waited for [s]
-LAST_WORDS = 10_000  # of what a process says on standard error, in which its last line is [B]
+READY_WITHIN = 30.0  # time from the start of a process to its first message [s]
+END_WITHIN = 5.0  # time for a process to end by itself when asked to [s]
+EXIT_DELAY_S = 0.8  # time between the end of a process's output and its own end [s]
+LOOK = 0.01  # interval of checks of a process that is awaited [s]
+LAST_WORDS = 10_000  # end of the standard error in which the last line is looked for [B]
 
 T = TypeVar("T")
 

@@ -19,8 +19,8 @@ from dva_sim.kernel.suggestions import either
 from dva_sim.kernel.whole_files import whole
 
 ROLES: Final = ("look", "phone", "drive", "dispatch", "supervise")
-MIN_LETTERS: Final = 8  # of a password
-MAX_LETTERS: Final = 200  # of a password: hashing longer ones is left to nobody
+MIN_LETTERS: Final = 8  # minimum characters of a password
+MAX_LETTERS: Final = 200  # maximum characters of a password, as hashing takes time
 MAX_USERS: Final = 1000
 MAX_BYTES: Final = 1 << 20
 _NAME: Final = re.compile(r"\w[\w .-]{0,39}")

@@ -13,8 +13,8 @@ from websockets.exceptions import InvalidState
 from dva_sim.serving.connection import PLACE, WIRE, extended, reset, wire_of
 from dva_sim.serving.port_connections import PortConnection
 
-STALLED: Final = 5.0  # without a byte taken, a client is dropped [s]
-FAREWELL: Final = 10.0  # for what is on its way to a client that was dropped [s]
+STALLED: Final = 5.0  # a client that takes no byte for this long is dropped [s]
+FAREWELL: Final = 10.0  # time for data under way to a dropped client [s]
 
 
 class WireProtocol(WebSocketsSansIOProtocol):

@@ -39,8 +39,8 @@ from numpy.typing import ArrayLike
 
 from dva_sim.statistics.persons import LEVEL, RESAMPLES, Floats, draws, students_t
 
-MIN_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
-MIN_ERROR = 0.25  # of the sample's standard error, in any draw
+MIN_TO_RESAMPLE = 6  # with fewer, 5 % of the draws repeat one person only and have no spread
+MIN_ERROR = 0.25  # minimum standard error in any draw, relative to the sample's
 _ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
 
 

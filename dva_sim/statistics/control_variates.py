@@ -20,7 +20,7 @@ from dva_sim.statistics.persons import Floats
 
 MIN_EACH = 6
 """Persons for each number that is learned; with fewer the slopes cost more than they are worth."""
-_DISTINCT = 1e-9  # share of its own size by which a covariate differs from the others
+_DISTINCT = 1e-9  # relative size below which a covariate's own part counts as zero
 
 
 def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from dva_sim.statistics.bands import MIN_ERROR, reach
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
 
-RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
-_MAX_CORRELATION = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
-_MIN_PERSONS = 3  # persons; of two, any are perfectly correlated
+RESAMPLES = 1000  # bootstrap samples, each with as many jackknife steps as there are persons
+_MAX_CORRELATION = 1 - 1e-12  # largest correlation, finite on Fisher's scale
+_MIN_PERSONS = 3  # minimum persons: two are always perfectly correlated
 
 
 @dataclass(frozen=True)

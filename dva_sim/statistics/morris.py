@@ -19,7 +19,7 @@ from dva_sim.statistics.bands import band
 from dva_sim.statistics.persons import Floats, Interval
 
 GRID = 4  # values of each factor: 0, 1/3, 2/3 and 1 of its band
-STEP = GRID / (2.0 * (GRID - 1))  # by which one factor changes, as a share of its band
+STEP = GRID / (2.0 * (GRID - 1))  # step of a factor, as a share of its band
 
 
 def trajectories(axes: int, count: int, rng: np.random.Generator) -> Floats:

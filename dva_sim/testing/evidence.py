@@ -27,9 +27,9 @@ UNFINISHED: Final = "the run was interrupted or is still running; it was checked
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
 
-OPPORTUNITIES: Final = (".up", ".down")  # the endings of Mahimahi's traces
-OPPORTUNITY_BYTES: Final = 1500  # what each lets through
-LONG_GAP_S: Final = 60.0  # a trace without opportunities for longer is doubted
+OPPORTUNITIES: Final = (".up", ".down")  # endings of Mahimahi's traces
+OPPORTUNITY_BYTES: Final = 1500  # bytes that one opportunity lets through [B]
+LONG_GAP_S: Final = 60.0  # longest gap of a trace that is not questioned
 
 Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was looked at
 

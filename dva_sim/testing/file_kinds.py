@@ -44,8 +44,8 @@ from dva_sim.worlds.geojson import read_features, storeys
 from dva_sim.worlds.maps import RosMap, doubts_of_map
 from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, doubts_of_site, load_site, map_site
 
-PROBE: Final = "drive-to-event"  # the scenario that a map is tried with
-PROBES: Final = 6  # its runs
+PROBE: Final = "drive-to-event"  # scenario with which a map is tried
+PROBES: Final = 6  # number of its runs
 _SCENARIOS: Final = (
     Scenario,
     TimedScenario,

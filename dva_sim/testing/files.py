@@ -206,7 +206,7 @@ _FILES: Final[dict[str, tuple[str, ...]]] = {
     "cases": ("validation cases",),
     "site": ("site",),
 }  # by their names; an agent is whatever lies in a folder of agents
-_KEYS: Final = "Attributes"  # the section of a model's description that tells its keys
+_KEYS: Final = "Attributes"  # section of a model's description with its keys
 _KEY: Final = re.compile(r"^ {4}(?P<key>\w+): (?P<text>.*(?:\n {5,}.*)*)", re.MULTILINE)
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 

@@ -31,7 +31,7 @@ Point = tuple[float, float]
 Make = Callable[[Point, float], Hazard]
 
 SITE: Final = "caparica"
-SOURCE: Final = (19.0, 22.5)  # in its chemistry lab, whose door opens on a corridor [m]
+SOURCE: Final = (19.0, 22.5)  # place in its chemistry lab, whose door opens on a corridor [m]
 NEARBY_PLACES: Final = (
     (19.5, 22.5),
     (21.0, 22.5),
@@ -40,17 +40,17 @@ NEARBY_PLACES: Final = (
     (20.0, 12.0),
     (19.0, 15.6),
 )
-DISTANT_PLACE: Final = (10_000.0, 10_000.0)  # [m]
-START: Final = 50.0  # [s]
-AGES: Final = (0.5, 2.0, 7.0, 20.0, 60.0, 200.0, 601.0, 1800.0, 7200.0)  # [s]
+DISTANT_PLACE: Final = (10_000.0, 10_000.0)  # place far from any hazard [m]
+START: Final = 50.0  # start of the hazard [s]
+AGES: Final = (0.5, 2.0, 7.0, 20.0, 60.0, 200.0, 601.0, 1800.0, 7200.0)  # ages of the hazard [s]
 TINY: Final = 1e-9  # age at which nothing has happened yet [s]
-NOTHING: Final = 1e-3  # as good as none, of a radius [m] or a severity
-LATER: Final = 640.0  # it may as well begin so much later [s]
+NOTHING: Final = 1e-3  # radius [m] or severity that counts as none
+LATER: Final = 640.0  # delay of a start that must not change anything but time [s]
 STOPPED: Final = 200.0  # age at which its source is stopped [s]
 CLOSE: Final = 1e-6  # relative difference by rounding
-SLOW: Final = 1e-3  # [s] of one answer; above that an episode is no longer fast
-SLOW_PICTURE: Final = 0.5  # [s]
-CELL: Final = 1.0  # of a picture [m]
+SLOW: Final = 1e-3  # time of an answer above which an episode is slow [s]
+SLOW_PICTURE: Final = 0.5  # the same for a picture [s]
+CELL: Final = 1.0  # side of a cell of a picture [m]
 
 # What a part is measured in is larger than this nowhere on earth.
 EXTREME: Final = Conditions(

@@ -28,8 +28,8 @@ SHORT: Final[dict[str, tuple[tuple[str, Mapping[str, Any]], ...]]] = {
     "middleware": (("commands-over-middleware", {"measure_s": 1, "set_up_s": 2}),),
 }
 """Scenarios that are run of each model, made short."""
-SEED: Final = 1  # of the runs
-SLOW: Final = 1.0  # [s] of one answer; above that a study takes much longer
+SEED: Final = 1  # random seed of the runs
+SLOW: Final = 1.0  # time of an answer above which a study takes much longer [s]
 
 
 def check_measure(

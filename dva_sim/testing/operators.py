@@ -28,7 +28,7 @@ from dva_sim.agents.route_following import Route
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.promises import Case, Outcome, broken_in, kept, part_by_part
 
-FRAME: Final = 0.1  # from one picture to the next [s]
+FRAME: Final = 0.1  # interval between two pictures [s]
 ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
 CURSOR: Final = Reach(0.5, 1.0)
 ROUTES: Final = {
@@ -38,20 +38,20 @@ ROUTES: Final = {
 }
 STAIRS: Final = tuple((4.0 * (n // 2), 4.0 * ((n + 1) // 2)) for n in range(16))  # 60 m
 WAYS: Final = {**ROUTES, "a long way": STAIRS}
-LONG: Final = 120.0  # so long one is watched there, to see what it does late in a drive [s]
-DELAYS: Final = (0.0, 1.0)  # [s]
-STOP: Final = 0.5  # before the end of a way [m]
-CORRIDOR: Final = 1.0  # either side of a way [m]
+LONG: Final = 120.0  # duration of such a drive, which shows late behaviour [s]
+DELAYS: Final = (0.0, 1.0)  # delays of the loop [s]
+STOP: Final = 0.5  # distance before the end of a path at which a drive stops [m]
+CORRIDOR: Final = 1.0  # half the width of the corridor around a path [m]
 MAX_TIME_FACTOR: Final = 30.0  # a drive longer than this many times that at full speed fails
-SLOWER: Final = 6.0  # than full speed: that is slow
-REST: Final = 10.0  # watched at the end of a way [s]
-CREEP: Final = 0.005  # who wants less stands [m/s]
-SLOW: Final = 200e-6  # [s] of one answer; above that an episode is no longer fast
-SLACK: Final = 1e-9  # of limits, for rounding
-LOOKS: Final = 400  # things seen at random
-EXTREME_OFFSETS: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # [m], or [rad]
-WAITS: Final = (0.0, 0.02, 0.1, 5.0)  # between two pictures [s]
-GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # of the delay [s]
+SLOWER: Final = 6.0  # factor on the time at full speed above which a drive is slow
+REST: Final = 10.0  # time for which the end of a path is watched [s]
+CREEP: Final = 0.005  # a smaller command counts as standing [m/s]
+SLOW: Final = 200e-6  # time of an answer above which an episode is slow [s]
+SLACK: Final = 1e-9  # rounding error of limits
+LOOKS: Final = 400  # number of random observations
+EXTREME_OFFSETS: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # offsets [m], or [rad]
+WAITS: Final = (0.0, 0.02, 0.1, 5.0)  # intervals between two pictures [s]
+GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # guesses of the delay [s]
 
 
 def check_operator(
@@ -272,7 +272,7 @@ class _Trial:
         return track
 
 
-PUSHED_AT: Final = 6.0  # in drives in which the robot is pushed aside [s]
+PUSHED_AT: Final = 6.0  # time at which the robot is pushed aside in some drives [s]
 
 
 def _way(corners: Sequence[tuple[float, float]]) -> Route:

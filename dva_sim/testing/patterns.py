@@ -28,18 +28,18 @@ from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, pa
 PHONE = "02:00:00:03:00:01"
 ROBOT = "02:00:00:01:00:01"
 RATE: Final = 10.0  # commands per second
-LONG: Final = 20.0  # of a drive [s]
-DELAYS: Final = (0.0, 0.05, 0.5)  # one way [s]
+LONG: Final = 20.0  # duration of a drive [s]
+DELAYS: Final = (0.0, 0.05, 0.5)  # one-way delays [s]
 LOSS: Final = 0.03
-SERVICE: Final = 0.005  # of a command at the robot [s]
-SLOW_SERVICE: Final = 0.4  # [s]
-TIMEOUT: Final = 9.0  # [s]
+SERVICE: Final = 0.005  # processing time of a command at the robot [s]
+SLOW_SERVICE: Final = 0.4  # the same for a slow robot [s]
+TIMEOUT: Final = 9.0  # time-out of a request [s]
 ATTEMPTS: Final = 3
-MAX_QUEUED: Final = 20  # commands that may wait at the app
-SLACK: Final = 1.0  # beyond what the link needs [s]
+MAX_QUEUED: Final = 20  # maximum commands that may wait at the app
+SLACK: Final = 1.0  # tolerance beyond the time that the link needs [s]
 NOTICED: Final = 5.0  # margin after the time-outs of all attempts [s]
-RETURN_DELAY_S: Final = 15.0  # after the robot is back it is driven again [s]
-SLOW: Final = 50e-6  # [s] of one command; above that an episode is no longer fast
+RETURN_DELAY_S: Final = 15.0  # time after which a robot that is back must be driven again [s]
+SLOW: Final = 50e-6  # time of a command above which an episode is slow [s]
 
 
 def check_pattern(

@@ -32,7 +32,7 @@ from dva_sim.protocol.event_kinds import EVENT_KINDS
 from dva_sim.testing.promises import Case, Outcome, error_with_line, is_slow, kept, line
 
 _PLACE: Final = 400.0  # edge of the site [m]
-_PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], mobilisation [s]
+_PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # speed [m/s], mobilisation [s]
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def _read_only(array: Floats) -> Floats:
 
 
 SITUATIONS: Final = 200
-SLOW: Final = 0.1  # [s] of one decision; above that an episode is no longer fast
+SLOW: Final = 0.1  # time of a decision above which an episode is slow [s]
 TOO_MANY_ROBOTS: Final = "sends more robots than operators are free; the core drops the rest"
 
 

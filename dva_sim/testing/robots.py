@@ -16,13 +16,13 @@ from dva_sim.worlds.drives import MAX_TICK, Drive, DriveSpec, GuardedDrive, load
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
 
-TICKS: Final = (0.01, 0.02, MAX_TICK)  # [s]
-DRIVES: Final = 40  # random drives by themselves, of a minute each
-COMMANDS: Final = 30  # of such a drive, 2 s each
+TICKS: Final = (0.01, 0.02, MAX_TICK)  # lengths of a tick [s]
+DRIVES: Final = 40  # random drives of a minute each
+COMMANDS: Final = 30  # commands of such a drive, 2 s each
 APPROACHES: Final = 24  # angles at which a wall is hit at top speed
-SLOW: Final = 50e-6  # [s] of one answer; above that an episode is no longer fast
-SLACK: Final = 1e-9  # of limits, for rounding
-CREEP: Final = 0.01  # backwards, while motors come to rest [m/s]
+SLOW: Final = 50e-6  # time of an answer above which an episode is slow [s]
+SLACK: Final = 1e-9  # rounding error of limits
+CREEP: Final = 0.01  # allowed speed backwards while motors come to rest [m/s]
 HOSTILE: Final = (math.nan, math.inf, -math.inf, 1e308, -1e308, -1.0, 1e-300, 0.0, 9.0)
 
 

@@ -17,14 +17,14 @@ from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, pa
 Pair = tuple[float, float]
 Part = Callable[[], Iterator[Case]]
 
-PERIOD: Final = 1 / 34  # between samples [s]
-LONG: Final = 20_000  # samples, ten minutes: what came before is forgotten
-RUNS: Final = 40  # of random readings
-SAMPLES: Final = 120  # of such a run
-SLOW: Final = 20e-6  # [s] of one reading; above that an episode is no longer fast
-HAND: Final = (19.0, 57.0)  # the largest reading that a hand can tilt to, at 45 degrees
-CLOSE_WITHIN_S: Final = 0.9  # in which a gap on the display is to be closed [s]
-REACHED_SHARE: Final = 0.02  # of the full range: as good as there
+PERIOD: Final = 1 / 34  # interval between samples [s]
+LONG: Final = 20_000  # samples of ten minutes, after which earlier ones are forgotten
+RUNS: Final = 40  # runs of random readings
+SAMPLES: Final = 120  # samples of such a run
+SLOW: Final = 20e-6  # time of a reading above which an episode is slow [s]
+HAND: Final = (19.0, 57.0)  # largest readings that a hand can reach by tilting, at 45 degrees
+CLOSE_WITHIN_S: Final = 0.9  # time in which a gap on the display has to be closed [s]
+REACHED_SHARE: Final = 0.02  # difference that counts as reached, as a share of the full range
 HOSTILE: Final = (0.0, 1e-300, -1e-300, 1e3, -1e3, 1e9, -1e9)
 
 

@@ -23,13 +23,13 @@ from dva_sim.network.middleware.programs import TELE_OP
 from dva_sim.testing.promises import Case, Outcome, broken_in, kept, part_by_part
 
 COMMANDS: Final = 20
-PICTURES: Final = (8, 2_000, 30_000)  # bytes of those that are sent
-STEP: Final = 0.02  # between two messages [s]
+PICTURES: Final = (8, 2_000, 30_000)  # sizes of the pictures that are sent [B]
+STEP: Final = 0.02  # interval between two messages [s]
 CONNECTS_S: Final = 10.0
 ARRIVES_S: Final = 5.0
-ALONE_S: Final = 0.5  # how long the operator's end waits for nobody
-SLACK_S: Final = 2.0  # of the machine, beyond what is promised
-LOST_COMMANDS: Final = 100  # commands sent while the robot takes nothing
+ALONE_S: Final = 0.5  # time for which the operator's end waits for a missing robot
+SLACK_S: Final = 2.0  # tolerance for a busy machine
+LOST_COMMANDS: Final = 100  # commands sent while the robot takes none
 
 CONNECTS: Final = "connects although the robot's end opens later"
 CARRIES: Final = "delivers the commands that it took, byte for byte"

@@ -13,8 +13,8 @@ from dva_sim.agents.device import AUDIT, EVENT, AgentDevice, do_nothing
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-REFRESH = 10.0  # design: from one look at the whole list to the next, as news may be lost [s]
-MAX_CLOSED = 200  # design: events that are over and still known
+REFRESH = 10.0  # design: interval of requests for the whole list, as news may be lost [s]
+MAX_CLOSED = 200  # design: maximum closed events that are kept
 
 
 class ControlRoomAgent:

@@ -16,9 +16,9 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.control_room.profile import DispatcherProfile, Overrule
 from dva_sim.protocol import messages as m
 
-FREE = "free"  # what the DVA says of a candidate that can be sent
+FREE = "free"  # reason that the DVA states for a candidate that can be sent
 KINDS = {"Robot": "robot", "Guard": "guard"}
-MAX_TRIES = 3  # design: of one decision, when others decide meanwhile
+MAX_TRIES = 3  # design: attempts at a decision while others decide meanwhile
 
 
 @dataclass

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 from dva_sim.protocol import messages as m
 
-MAX_STEPS: Final = 60  # design: of one event; of more the oldest but the report are lost
-SAME_STEP: Final = 2.0  # design: a state and the decision that led to it are told within this [s]
+MAX_STEPS: Final = 60  # design: maximum steps of an event; then the oldest but the report go
+SAME_STEP: Final = 2.0  # design: a state and its decision arrive within this time [s]
 LED_BY: Final = {
     "assign": "assigned",
     "false_alarm": "refuted",

@@ -23,13 +23,13 @@ from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
 from dva_sim.serving.processes import Child, end_all
 
-PORT = 7000  # at which each relay takes connections across the link
+PORT = 7000  # port at which each relay takes connections across the link
 ENDS = {NEAR: FAR, FAR: NEAR}
 _RETRY_DELAY_S = 0.05  # pause between attempts to reach the relay at the other end [s]
-_BUFFER = 4096  # of a relay, each way [B]
-_LONGEST = 90  # of the folder's name: Linux takes 107 characters for the name of a socket
-_BACKLOG = 128  # connections that a relay has not taken yet
-_NUMBER = 2  # bytes in which a connection says where it goes
+_BUFFER = 4096  # buffer of a relay in each direction [B]
+_LONGEST = 90  # maximum length of the folder's name: Linux limits socket names to 107 characters
+_BACKLOG = 128  # maximum connections that a relay has not accepted yet
+_NUMBER = 2  # size of the number by which a connection states its destination [B]
 
 
 class CrossedLink:

@@ -23,7 +23,7 @@ KILL_ALL = signal.SIGUSR1
 _PASSED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 _TAKEN = {*_PASSED_ON, KILL_ALL, signal.SIGCHLD}
 _NONE = "-"
-_BY_SIGNAL = 128  # exit codes of programs that a signal has ended, as shells give them
+_BY_SIGNAL = 128  # base of exit codes of programs ended by a signal, as in shells
 
 
 def words_of(user_space: int | None, network: int, program: list[str]) -> list[str]:

@@ -27,7 +27,7 @@ FORWARDER_PRIORITY = 20  # real-time, above the programs'
 NEAR = "near"
 FAR = "far"
 _LARGEST = 65_536
-_MAX_AT_ONCE = 32  # packets of one device before what is due is looked at again
+_MAX_AT_ONCE = 32  # maximum packets of one device before due ones are sent
 _VERSION_4 = 4
 
 Links = tuple[Link, Link]

@@ -15,7 +15,7 @@ from dva_sim.network.link import LinkConfig
 
 BEGIN = b"begin"
 END = b"end"
-_A_WHILE_S = 60.0  # no call of the system waits for ever
+_A_WHILE_S = 60.0  # longest wait in a system call
 
 
 def hold(

@@ -24,7 +24,7 @@ from dva_sim.network.emulator.report import LinkReport
 from dva_sim.serving.processes import END_WITHIN, Child, end_all
 from dva_sim.serving.signals import caught_signals
 
-GRACE_S = END_WITHIN  # for a command to end by itself once a signal has asked it to
+GRACE_S = END_WITHIN  # time for a command to end by itself after a signal
 
 Tell = Callable[[str], object]
 

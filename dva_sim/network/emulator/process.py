@@ -24,8 +24,8 @@ from dva_sim.serving.processes import Child, ChildFailed, end_all
 ADDRESSES = {NEAR: NEAR_END.address, FAR: FAR_END.address}
 _VARIABLES = {f"DVA_LINK_{end.upper()}": address for end, address in ADDRESSES.items()}
 _SPACES = 3  # a user namespace, and a network namespace for each end
-_KILLED_WITHIN_S = 10.0  # for the kernel to end all that a program has started
-_PATIENCE_S = 30.0  # for the link to stand, and for its report
+_KILLED_WITHIN_S = 10.0  # time for the kernel to end all processes of a program
+_PATIENCE_S = 30.0  # time for the link to come up, and for its report
 
 
 class LinkEnded(ChildFailed):

@@ -14,7 +14,7 @@ from contextlib import suppress
 
 from dva_sim.network.emulator.linux_calls import NEAR_END
 
-_HOSTS = "127.0.0.1", NEAR_END.address  # where a program of the near end may listen
+_HOSTS = "127.0.0.1", NEAR_END.address  # addresses at which a program of the near end may listen
 _CHUNK = 65_536
 BROKEN = OSError, asyncio.IncompleteReadError, asyncio.CancelledError
 """Errors that end a connection; before Python 3.12, a server prints a traceback of the last one."""

@@ -22,7 +22,7 @@ from dva_sim.network.emulator.report import LinkFlow
 
 CHUNK_BYTES = 1448
 _HEADERS_BYTES = 52
-_LOOK_AGAIN_S = 0.001  # whether a full queue has room
+_LOOK_AGAIN_S = 0.001  # interval of checks whether a full queue has room
 
 
 @dataclass(eq=False)

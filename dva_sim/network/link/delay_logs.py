@@ -23,16 +23,16 @@ _BEGIN: Final = "PING "  # the first line of each run of ping
 _SUMMARY_STARTS: Final = ("--- ", "rtt ")  # lines of its summary
 _SUMMARY: Final = re.compile(r"\d+ packets transmitted")
 _NUMBERS: Final = 65536  # ping counts its requests with 16 bits
-_SAME_S: Final = 0.01  # replies to one request agree this well on when it was sent
+_SAME_S: Final = 0.01  # tolerance of the sending time among replies to one request [s]
 
 _UNIT_OF: Final = re.compile(r"(?:[a-z_ ]*[\s_\[(])?(s|ms|us|µs|ns)[\])]?", re.IGNORECASE)
 _TIMES: Final = re.compile(r"time|elapsed|sent|epoch|date|\bt\b", re.IGNORECASE)
 _DELAYS: Final = re.compile(r"rtt|delay|latency|owd|round", re.IGNORECASE)
 _RATES: Final = re.compile(r"bps|bit|byte|throughput|bandwidth|\brate", re.IGNORECASE)
-_EPOCH: Final = (1e9, 1e10)  # today in seconds, with room: years 2001 to 2286
-_SPARSE_S: Final = 5.0  # between probes: a longer step is doubted
-_SPARSEST_S: Final = 60.0  # a longer step is in a smaller unit
-_USUAL_S: Final = (0.010, 2.0)  # median delay that needs no unit to be believed
+_EPOCH: Final = (1e9, 1e10)  # plausible range of today's time in seconds: years 2001 to 2286
+_SPARSE_S: Final = 5.0  # longer steps between probes are questioned [s]
+_SPARSEST_S: Final = 60.0  # longer steps mean a smaller unit [s]
+_USUAL_S: Final = (0.010, 2.0)  # median delays that are plausible without a unit [s]
 _TOO_SHORT: Final = "needs probes of at least two moments"
 WRITE: Final = "write a first line such as time_s,delay_ms"
 

@@ -20,7 +20,7 @@ from dva_sim.network.middleware.ends import (
 
 COMMANDS = "command"
 PICTURES = "picture"
-_STEP: Final = 0.01  # between two looks whether the other end is there [s]
+_STEP: Final = 0.01  # interval of checks for the other end [s]
 
 
 class DdsTransport(CommandTransport):

@@ -13,8 +13,8 @@ from typing_extensions import override
 from dva_sim.network.middleware.ends import TransportEnd, TransportError
 
 T = TypeVar("T")
-_FAREWELL: Final = 0.5  # [s]
-_AGAIN: Final = 0.1  # between two attempts to connect [s]
+_FAREWELL: Final = 0.5  # time for the last messages to leave [s]
+_AGAIN: Final = 0.1  # interval between two attempts to connect [s]
 
 
 class LoopEnd(TransportEnd):

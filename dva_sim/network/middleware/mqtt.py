@@ -39,7 +39,7 @@ PICTURES = "picture"
 ROBOT_TOPIC: Final = (
     "robot"  # where the robot's end says that it hears commands; the broker keeps it
 )
-_AGAIN: Final = 0.1  # between two attempts to connect [s]
+_AGAIN: Final = 0.1  # interval between two attempts to connect [s]
 
 
 class MqttTransport(CommandTransport):

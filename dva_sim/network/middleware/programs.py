@@ -44,12 +44,12 @@ from dva_sim.protocol.messages import OK, Reply, SetTeleOp, make_message, make_s
 OPERATOR_ID: Final = "02:00:00:00:00:01"
 ROBOT_ID: Final = "02:00:00:00:00:02"
 SESSION: Final = 1
-SPEED = 0.5  # of every command [m/s]
-TURN_RATE = 0.1  # of every command [rad/s]
-NOON: Final = "12:00:00.000"  # nobody reads it: ages are by number
-PROGRAM_PRIORITY: Final = 10  # real-time, below the link's
-NOT_CONNECTED: Final = 3  # exit code
-OUTLIVES_S: Final = 60.0  # the robot's program after the operator's last command, unless killed
+SPEED = 0.5  # speed in every command [m/s]
+TURN_RATE = 0.1  # turn rate in every command [rad/s]
+NOON: Final = "12:00:00.000"  # time stamp that nobody reads: ages are by number
+PROGRAM_PRIORITY: Final = 10  # real-time priority, below that of the link
+NOT_CONNECTED: Final = 3  # exit code of a program without a connection
+OUTLIVES_S: Final = 60.0  # time for which the robot's program outlives the last command
 _PICTURE: Final = struct.Struct("q")
 
 

@@ -19,9 +19,9 @@ from dva_sim.network.middleware.ends import (
     connected,
 )
 
-LARGEST: Final = 65_000  # payload of a datagram, which IP sends in fragments [B]
+LARGEST: Final = 65_000  # maximum payload of a datagram, which IP sends in fragments [B]
 _GREETING: Final = b"hello"
-_AGAIN: Final = 0.2  # between two greetings [s]
+_AGAIN: Final = 0.2  # interval between two greetings [s]
 
 
 class UdpTransport(CommandTransport):

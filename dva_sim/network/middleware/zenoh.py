@@ -19,7 +19,7 @@ from dva_sim.network.middleware.ends import (
 
 COMMANDS = "command"
 PICTURES = "picture"
-_AGAIN: Final = 0.1  # between two looks whether the other end is there [s]
+_AGAIN: Final = 0.1  # interval of checks for the other end [s]
 
 
 class ZenohTransport(CommandTransport):

@@ -23,7 +23,7 @@ from dva_sim.network.middleware.ends import (
 from dva_sim.network.realtime import LiveClock, ProgramClock, Socket
 from dva_sim.network.workload import OPERATOR, ROBOT, UNBOUNDED
 
-HIGH_WATER_MARK: Final = 1000  # ZeroMQ's own [messages]
+HIGH_WATER_MARK: Final = 1000  # ZeroMQ's default [messages]
 Pattern = Literal["req-rep", "pub-sub", "conflate"]
 _SOCKETS: Final = {
     "req-rep": (zmq.REQ, zmq.REP),

@@ -182,7 +182,7 @@ class Bulk:
         peer.read(peer.readable)
 
 
-DRAIN_S = 5.0  # the last messages that count may still arrive; assumed
+DRAIN_S = 5.0  # time in which the last messages that count may still arrive; assumed
 Rate = Annotated[float, Field(gt=0, le=200)]
 Floats = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
-FIRST_TIMEOUT = 1.0  # [s]: RFC 6298
-MIN_TIMEOUT = 1.0  # [s]: RFC 6298
-MAX_TIMEOUT = 60.0  # [s]: RFC 6298
-REPEATED = 32  # datagrams that an acknowledgement tells of: the bits of a word; assumed
+REORDERED = 3  # later datagrams acknowledged that make one count as lost: RFC 5681
+FIRST_TIMEOUT = 1.0  # time-out before the first measurement [s]: RFC 6298
+MIN_TIMEOUT = 1.0  # shortest time-out [s]: RFC 6298
+MAX_TIMEOUT = 60.0  # longest time-out [s]: RFC 6298
+REPEATED = 32  # datagrams covered by an acknowledgement: the bits of a word; assumed
 Echo = tuple[int, float]  # a datagram's number, and since when it had been there [s]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from dva_sim.network.transports.interface import Deliver, TransportMessage
 
-IP_UDP = 28  # headers: RFC 791 and 768 [B]
+IP_UDP = 28  # size of the headers: RFC 791 and 768 [B]
 PACKET = 1500  # largest IP packet of Ethernet: RFC 894 [B]
 
 

@@ -21,7 +21,7 @@ from dva_sim.network.transports.message_parts import IP_UDP, Assembly, MessagePa
 from dva_sim.network.transports.pace import Aimd, Pace
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
-SLACK = 1e-6  # the clock's grain [s]
+SLACK = 1e-6  # resolution of the clock [s]
 
 
 class DatagramSender:

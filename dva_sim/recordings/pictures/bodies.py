@@ -22,7 +22,7 @@ from dva_sim.recordings.pictures.moments import FRESH_FOR_S, Moments, kind_of
 LARGER = 1.25  # bodies are drawn a little larger than they are
 
 
-STEP = 0.5  # between the points of a trail [s]
+STEP = 0.5  # interval between the points of a trail [s]
 
 
 CONE = 2.5  # length of the view cone [m]

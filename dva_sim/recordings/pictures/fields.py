@@ -17,16 +17,16 @@ from dva_sim.recordings.pictures import colours, style
 from dva_sim.recordings.pictures.moments import Moments
 from dva_sim.worlds.hazards import Hazard, Raster
 
-LAYER = 2.2  # over the floors, under walls and names
+LAYER = 2.2  # drawing order: over the floors, under walls and names
 STAR = 12  # size of the mark of a source [points]
 MARK = 8  # size of the mark of a source [points]
-CELL = 0.25  # of the fields [m]
-MAX_CELLS = 120_000  # of a field; on a larger site cells are larger
-SMOKE_PATH = 2.5  # smoke covers the floor as it does a thing so far away [m]
-THICKEST = 0.58  # so much of the floor does smoke cover at most
-DEEP = 0.15  # from this depth water has its full colour [m]
-DRAWN_DEPTH_M = 0.002  # less is not drawn [m]
-MIN_HEAT = 1.0  # less is not drawn [kW/m2]
+CELL = 0.25  # side of a cell of the fields [m]
+MAX_CELLS = 120_000  # maximum cells of a field; a larger site has larger ones
+SMOKE_PATH = 2.5  # optical path through smoke that covers the floor [m]
+THICKEST = 0.58  # maximum opacity of smoke over the floor
+DEEP = 0.15  # depth from which water has its full colour [m]
+DRAWN_DEPTH_M = 0.002  # least depth that is drawn [m]
+MIN_HEAT = 1.0  # least heat flux that is drawn [kW/m2]
 
 
 class DrawnFields:

@@ -20,12 +20,12 @@ from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.simulation.full import Playback
 
 FPS = 8
-LENGTH_S = 16.0  # a film lasts about this long; the run is sped up to fit
-HELD_S = 3.0  # so long does its last picture stand
-GLANCES = 2  # pictures of a camera that a film shows in a second: more are no easier to follow
+LENGTH_S = 16.0  # approximate length of a film; the run is sped up to fit
+HELD_S = 3.0  # time for which its last picture is shown
+GLANCES = 2  # camera pictures per second of a film: more would be no easier to follow
 DPI = 100
-TRAFFIC = 0.8  # height of what is below maps, without a camera's picture
-EYE = 1.5  # height of what is below maps, with a camera's picture
+TRAFFIC = 0.8  # height of the part below maps without a camera's picture
+EYE = 1.5  # height of the part below maps with a camera's picture
 # What is there: its place from the left and from the top, its width and height, as shares.
 SINGLE_VIEW = (0.18, 0.0, 0.79, 0.68)
 STRIP = (0.62, 0.12, 0.35, 0.65)

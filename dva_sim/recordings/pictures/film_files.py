@@ -18,13 +18,13 @@ from dva_sim.kernel.whole_files import whole
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.film import FPS, Film
 
-COLOURS = 112  # of a GIF
+COLOURS = 112  # colours of a GIF
 
 
-COLOUR_TOLERANCE = 8  # a colour that differs less from the last picture's stays as it was, of 255
+COLOUR_TOLERANCE = 8  # change below which a pixel keeps its colour, of 255
 
 
-SAMPLES = 6  # pictures that these are chosen from
+SAMPLES = 6  # pictures from which the colours are chosen
 
 
 def write_film(film: Film, path: Path) -> None:

@@ -17,9 +17,9 @@ from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.camera.picture import Picture
 from dva_sim.worlds.geo import Pose
 
-GONE = 1.0  # so long after the end of the track of somebody who left [s]
-PERSON = 0.25  # radius of somebody on foot, seen from above [m]
-FRESH_FOR_S = 3.0  # an older picture is not looked at any more [s]
+GONE = 1.0  # time after the end of a track from which a person counts as gone [s]
+PERSON = 0.25  # radius of a person on foot, seen from above [m]
+FRESH_FOR_S = 3.0  # age above which a picture is not shown any more [s]
 
 
 def kind_of(label: str) -> str:

@@ -17,13 +17,13 @@ from dva_sim.recordings.pictures.colours import BYSTANDER
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
-MOVING_COST = 6.0  # a name stays on its side rather than jump for less [pixels of overlap]
+MOVING_COST = 6.0  # overlap above which a name changes sides [pixels]
 
 
 SOURCE = 11.0  # diameter of the mark of a hazard [points]
 
 
-OUTSIDE_COST = 50.0  # of a pixel beyond the border of the map
+OUTSIDE_COST = 50.0  # cost of a pixel beyond the border of the map
 
 
 class Box(NamedTuple):

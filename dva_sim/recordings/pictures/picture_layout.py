@@ -20,12 +20,12 @@ MARGIN = 0.06  # around everything
 GAP = 0.16  # between columns
 
 
-HEADING = 0.24  # of the lines above all
-TITLE_HEIGHT = 0.22  # of the lines above a map
-LINE = 0.32  # of a line below a map
+HEADING = 0.24  # height of the lines above everything
+TITLE_HEIGHT = 0.22  # height of the lines above a map
+LINE = 0.32  # height of a line below a map
 
 
-TALLEST = 7.5  # a map
+TALLEST = 7.5  # maximum height of a map
 
 
 class Sheet:

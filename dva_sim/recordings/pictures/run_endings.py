@@ -9,7 +9,7 @@ from typing import NamedTuple
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.full import Playback
 
-TIE_S = 0.05  # a shorter lead is none, as times are told [s]
+TIE_S = 0.05  # a shorter lead counts as none, given the resolution of times [s]
 
 
 class RunVerdict(NamedTuple):

@@ -22,8 +22,8 @@ from dva_sim.recordings.pictures.run_endings import RunVerdict
 from dva_sim.worlds.view import draw_site
 from dva_sim.worlds.view_marks import points_per_metre
 
-PLAIN = 0.6  # width of a letter on the average, at most [font sizes]
-BOLD = 0.68  # width of a bold letter on the average, at most [font sizes]
+PLAIN = 0.6  # upper bound of the mean width of a letter [font sizes]
+BOLD = 0.68  # upper bound of the mean width of a bold letter [font sizes]
 
 
 class Scene:

@@ -27,17 +27,17 @@ from dva_sim.recordings.pictures.moments import Moments
 INK = "#2b3038"
 HALO = "white"
 GHOST = "#e07a00"
-WIDTH = 8.4  # of a picture [in]: a page shows 840 pixels of it
-FONT = 8.0  # of labels [points]: 11 pixels on such a page
-TITLE = 10.0  # [points]
-MIN_NAME_POINTS = 6.5  # of names on the ground [points]: 9 pixels on such a page
-ROOMY = 10.0  # from this scale on a map has room for small marks [points/m]
+WIDTH = 8.4  # width of a picture [in]; a page shows it 840 pixels wide
+FONT = 8.0  # font size of labels [points]: 11 pixels on such a page
+TITLE = 10.0  # font size of titles [points]
+MIN_NAME_POINTS = 6.5  # font size of names on the ground [points]: 9 pixels on such a page
+ROOMY = 10.0  # scale from which a map has room for small marks [points/m]
 AHEAD_COLOUR = "#1b7a3d"
 BEHIND_COLOUR = "#59606a"
 FAILED = "#a03030"
-ENDS = (AHEAD_COLOUR, BEHIND_COLOUR, FAILED)  # how a run ended
-SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # diameters, however large the site [points]
-TRAIL_S = 40.0  # a trail's colour falls to a third in that time [s]
+ENDS = (AHEAD_COLOUR, BEHIND_COLOUR, FAILED)  # colours of the endings of runs
+SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # minimum diameters on any site [points]
+TRAIL_S = 40.0  # time in which a trail's colour falls to a third [s]
 
 SHAPES = {ROBOT: "s", GUARD: "o", BYSTANDER: "o"}
 
@@ -51,11 +51,11 @@ OUTLINES = {
     GUARD: ((0.82, 0.0), *_BEAK),
     BYSTANDER: ((0.82, 0.0), *_BEAK),
 }
-LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice the bow
+LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # lengths of the marker box, twice the bow
 
 SMALL = (*ROBOT_MODES.values(), *ACTIVITIES.values(), FIRE, GAS, WATER, GHOST, *ENDS)
-GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
-HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
+GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # shares of the lower explosive limit
+HEAT_LEVELS = (1.0, 2.5, 10.0)  # levels of heat flux [kW/m2]; skin bears 2.5 for long
 
 
 def colour_of(kind: str, mode: str) -> str:
