@@ -55,10 +55,10 @@ class Advised:
 
 
 class Dispatcher:
-    """Asks the policy, keeps what the rules allow.
+    """Dispatcher, which carries out the policy's advice as far as the rules allow.
 
     Args:
-        policy: Advises.
+        policy: Policy that advises.
         travel: Travel times and distances.
         orders: Current orders.
         rng: Random generator passed to policies.
@@ -68,7 +68,7 @@ class Dispatcher:
 
     Attributes:
         auctions: Auctions under way.
-        situations: Gathers what the policy is shown.
+        situations: Builder of the situations that the policy decides on.
         questions: Open questions of the policy to people.
         last_failure: Latest failure of the policy, in words.
     """
@@ -238,7 +238,7 @@ class Dispatcher:
         )
 
     def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
-        """Note the policy's decision: a fact, and what people are compared with later."""
+        """Note the policy's decision as a fact, and for comparison with people's decisions."""
         orders = self.orders
         if not orders.trail.keeps:
             return

@@ -1,7 +1,7 @@
-"""Robots that an emergency holds, as they say themselves, and who has released them.
+"""Robots held by an emergency, by their own reports, and the persons who released them.
 
-A robot obeys its own latch; what is kept here tells the DVA whom it cannot send, and stops a robot
-again whose program was replaced by one that knows nothing of its latch.
+A robot obeys its own latch. This table tells the DVA which robots it cannot send, and stops a robot
+again if its new program has lost the latch.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Step(StrEnum):
 
 @dataclass
 class Handover:
-    """One robot on its way to another holder, and how long that step may last [s]."""
+    """Handover of one robot: the device that asks, the step, and its deadline [s]."""
 
     asker: str
     step: Step

@@ -36,12 +36,12 @@ class KnownTeam:
     operators: list[DeviceEntry]
 
     def idle(self) -> set[str]:
-        """Return ids of those who do nothing."""
+        """Return the ids of idle responders."""
         pairs = zip(self.entries, self.engaged, strict=True)
         return {entry.device.id_tag for entry, event in pairs if event is None}
 
     def starts(self) -> list[Start]:
-        """Return from where they would set out."""
+        """Return the starting points of the responders."""
         return [
             Start(e.device.id_tag, KINDS[e.device.device_type], e.position, a is not None)
             for e, a in zip(self.entries, self.engaged, strict=True)
@@ -272,7 +272,7 @@ class SituationBuilder:
 
 
 def same_place(a: m.Position, b: m.Position) -> bool:
-    """Return True within a few metres."""
+    """Return True if two places are within a few metres."""
     return abs(a.latitude - b.latitude) + abs(a.longitude - b.longitude) < SAME_PLACE
 
 

@@ -109,7 +109,7 @@ class OmitsUnset(Config):
 
 
 class Sparse(Config):
-    """A configuration of which only the keys that were given are written.
+    """Configuration of which only explicitly set keys are written.
 
     Whatever was left out takes the default of the program, or of the profile that it changes.
     """

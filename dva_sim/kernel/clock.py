@@ -1,9 +1,8 @@
 """The one clock: SimPy in whole microseconds, seen by everyone else in seconds.
 
-Whole microseconds make simultaneous events exactly simultaneous (no 0.1 + 0.2), so
-the order of a run does not hang on rounding, and periodic events do not drift.
-Callbacks stand in SimPy's queue as they are: an event for each costs three times as much, and a
-process per packet nine times.
+Whole microseconds make simultaneous events exactly simultaneous (no 0.1 + 0.2), so the order of a
+run does not depend on rounding, and periodic events do not drift. Callbacks are put into SimPy's
+queue directly: an event for each costs three times as much, and a process per packet nine times.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
 
 
 def _elsewhere(path: KeyPath, key_by_name: Mapping[str, str]) -> list[str]:
-    """Return keys in other places that are called so, or else the one most like it."""
+    """Return keys of the same name in other places, or the most similar one."""
     last = plain_name(str(path[-1]))
     names = {name: plain_name(name.rpartition(".")[2]) for name in key_by_name}
     near = last if last in names.values() else guess(last, names.values())
@@ -166,7 +166,7 @@ def _dotted(path: KeyPath) -> str:
 
 
 def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
-    """Yield every field of a model, by its dotted key, each followed by those of its model."""
+    """Yield every field of a model by its dotted key, each followed by its own fields."""
     for name, info in _fields(model).items():
         yield f"{above}{name}", info
         inner = model_in(info.annotation)
@@ -237,7 +237,7 @@ def first_mistake(
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
-    """Return the path of a key, without what names one of several kinds that a value may be of."""
+    """Return the path of a key, without the names of alternative kinds of a value."""
     loc = problem["loc"]
     if loc and loc[-1] in _PLAIN and problem["type"].endswith("_type"):
         loc = loc[:-1]
@@ -259,7 +259,7 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
 
 
 def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
-    """Return one mistake in words, from all that was found at its place.
+    """Return one mistake in words, from all errors found at its place.
 
     One for each kind allowed.
     """
@@ -286,7 +286,7 @@ def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
 
 
 def _measure(info: Any, name: str, problem: Any) -> str:
-    """Return the unit of a bound: of the key's name, or a share where 1 is the most."""
+    """Return the unit of a bound: that of the key's name, or a share if the maximum is 1."""
     unit = name.rpartition("_")[2]
     if unit in _UNITS and unit != name:
         return f" {_UNITS[unit]}"
@@ -296,7 +296,7 @@ def _measure(info: Any, name: str, problem: Any) -> str:
 
 
 def _given(problem: Any, message: str) -> str:
-    """Return the value there is, unless it is long or has been told already."""
+    """Return the present value, unless it is long or was stated already."""
     value = problem["input"]
     if value is None:
         return ", not null" if problem["type"] != "value_error" else ""
@@ -357,7 +357,7 @@ def _or(words: Sequence[str]) -> str:
 
 
 def _choices(problem: Any) -> list[str]:
-    """Return the words that a value should be one of."""
+    """Return the words that a value may have."""
     return _quoted(problem["ctx"]["expected"])
 
 
@@ -366,7 +366,7 @@ def _quoted(text: str) -> list[str]:
 
 
 def _tag(problem: Any) -> str:
-    """Return the key whose value says of which kind a mapping is."""
+    """Return the key whose value selects the kind of a mapping."""
     return str(problem["ctx"]["discriminator"]).strip("'")
 
 

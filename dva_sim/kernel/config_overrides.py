@@ -45,7 +45,7 @@ def build(
         model: Class of the configuration.
         source: A document or plain data.
         changes: New values by dotted key; a number chooses an item of a list.
-        complete: Judges what the model alone cannot, and adds what follows from it.
+        complete: Function that checks what the model alone cannot, and adds derived values.
         locate: Lets files that the data names be found from the folders given.
 
     Raises:
@@ -103,7 +103,7 @@ def blame(
 
 
 def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
-    """Return a mistake of changes that were given as `--set key=value`, told with these words."""
+    """Return a mistake in changes given as `--set key=value`, stated in their words."""
     pair_by_key = {pair.partition("=")[0].strip(): pair for pair in pairs}
     if error.file is not None or not error.keys:
         return error
@@ -116,7 +116,7 @@ def _cut(pair: str) -> str:
 
 
 def set_key(data: dict[str, Any], key: str, value: Any) -> None:
-    """Change one value by dotted key, making the mappings on the way.
+    """Change one value by dotted key, creating missing mappings.
 
     Raises:
         ConfigError: a part of the key names something that is not there, or holds no keys.

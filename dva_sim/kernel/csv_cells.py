@@ -1,4 +1,4 @@
-"""Cells of tables with commas, of which spreadsheets would take some for formulas."""
+"""Cells of CSV tables, protected from being taken for formulas by spreadsheets."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ACTS: Final = r"^[=+\-@\t\r]"  # first characters that make a cell a formula
 
 
 def harmless(cell: Any) -> Any:
-    """Return a cell as it is, or, if it is text that would act, with an apostrophe before it."""
+    """Return a cell, with an apostrophe before text that would act as a formula."""
     return f"'{cell}" if isinstance(cell, str) and re.match(ACTS, cell) else cell
 
 

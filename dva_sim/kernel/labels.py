@@ -60,7 +60,7 @@ def with_id(label: str, id_tag: str) -> str:
 
 
 def distinct(label: str, id_tag: str, others: Iterable[str]) -> str:
-    """Return a label as it is shown: with the device's id where one of the others looks the same.
+    """Return a label for display, with the device's id if another label looks the same.
 
     Args:
         label: Label as given by a device.

@@ -1,4 +1,4 @@
-"""Named tuples in half the time, for those that are made at every message, picture and tick."""
+"""Named tuples made in half the time, for those of every message, picture and tick."""
 
 from __future__ import annotations
 

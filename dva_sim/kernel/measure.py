@@ -1,6 +1,6 @@
 """Measures: each column of a table, described once, beside the code that computes it.
 
-Tables, their dictionary, the words of reports and what a study may ask for all follow from these
+Tables, their dictionary, the words of reports and the measures of studies all follow from these
 objects. The unit is the end of the name, see `units`.
 """
 
@@ -61,7 +61,7 @@ class Measure:
         return low if self.low is None else self.low, high if self.high is None else self.high
 
     def as_json(self) -> dict[str, Any]:
-        """Return what a results folder keeps of it, to be read where its class is missing."""
+        """Return its description for a results folder, readable without its class."""
         values = {"meaning": self.meaning, "title": self.title, "better": self.better}
         return values | ({} if self.is_number else {"is_number": False})
 
@@ -76,5 +76,5 @@ def text(name: str, meaning: str) -> Measure:
 
 
 def names_of(measures: Iterable[Measure]) -> tuple[str, ...]:
-    """Return the names of those that are numbers."""
+    """Return the names of numeric measures."""
     return tuple(measure.name for measure in measures if measure.is_number)

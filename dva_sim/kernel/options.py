@@ -1,4 +1,4 @@
-"""Options of plug-ins: what a configuration gives, made sure of before anything runs.
+"""Options of plug-ins from a configuration, checked before anything runs.
 
 Each takes the name of an option and its value, returns the value, or says what would be right.
 """

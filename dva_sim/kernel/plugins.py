@@ -98,7 +98,7 @@ class Plugins(Generic[T]):
         def made(*arguments: Any) -> T:
             options_of_one = copy.deepcopy(
                 kept_options
-            )  # what it does to them, the next does not see
+            )  # changes by one plug-in must not reach the next
             one = self.make(word, factory, options_of_one, *arguments)
             return one if finish is None else self.ask(word, partial(finish, one))
 
@@ -135,7 +135,7 @@ class Plugins(Generic[T]):
     def make(
         self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *arguments: Any
     ) -> T:
-        """Make one of a class that was found, from options and from what it is always given.
+        """Make a plug-in of a loaded class, from its options and its fixed arguments.
 
         Raises:
             ConfigError: an option is unknown or bad, or it cannot be made.
@@ -144,7 +144,7 @@ class Plugins(Generic[T]):
         return self.ask(name, lambda: factory(*arguments, **options))
 
     def ask(self, name: str, what: Callable[[], A]) -> A:
-        """Do what runs code of one that was found, and tell what is wrong with that.
+        """Call code of a loaded plug-in, and report its errors.
 
         Raises:
             ConfigError: it fails, or ends the program.
@@ -232,7 +232,7 @@ class Plugins(Generic[T]):
 
 
 class Guard:
-    """Calls a plug-in in a run; failures are counted, and the caller continues without it.
+    """Guard of a plug-in in a run; failures are counted, and the caller continues without it.
 
     Attributes:
         failures: Number of missing or invalid answers.
@@ -265,7 +265,7 @@ class Guard:
 
 
 def word_of(name: object) -> str:
-    """Return what a name or a class is called in messages."""
+    """Return the name of a plug-in in messages."""
     return name if isinstance(name, str) else getattr(name, "__qualname__", repr(name))
 
 

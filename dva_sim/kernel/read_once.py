@@ -16,10 +16,10 @@ Version = tuple[str, tuple[int, ...]]
 def read_once(
     files: Callable[..., Iterable[Path]], most: int = 64
 ) -> Callable[[Callable[Asked, Read]], Callable[Asked, Read]]:
-    """Keep what a function makes of files as long as none of them changes.
+    """Cache a function's results until one of its files changes.
 
     Args:
-        files: Files that the function's first argument means, such as a map and its image.
+        files: Function that returns the files of the first argument, such as a map and its image.
         most: Number of results that are kept.
     """
 

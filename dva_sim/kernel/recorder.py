@@ -393,7 +393,7 @@ class Recorder:
             del self._issued[key]
 
     def violated(self, rule: str, time: float, who: str, what: str) -> None:
-        """Record a broken safety rule: counted always, told once per rule and agent."""
+        """Record a broken safety rule: always counted, reported once per rule and agent."""
         if not self.violations[rule]:
             self.tell(time, who, f"{rule} broken: {what}", "safety")
         self.violations[rule] += 1

@@ -97,7 +97,7 @@ def find(
 
 
 def _missing(name: str, folder: str, names: list[str], is_asked: bool) -> str:
-    """Describe a missing file: what else has its name, what was meant, or what there is."""
+    """Describe a missing file: others of its name, a similar name, or the available ones."""
     kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
     path = Path(name)
     other_kinds = {where: k for where, k in KINDS.items() if where != folder}

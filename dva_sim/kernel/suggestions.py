@@ -100,5 +100,5 @@ def either(names: Iterable[object]) -> str:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without what people mix up: capitals, and the signs between words."""
+    """Return a name without capitals and separators, which people mix up."""
     return re.sub(r"[\s_.-]+", "_", name.casefold())

@@ -41,7 +41,7 @@ class Cell:
 
     @property
     def decimal(self) -> str:
-        """Content with a decimal point.
+        """Content of the cell with a decimal point.
 
         Raises:
             ConfigError: it is a number with a point in a table of decimal commas, where 1.060 may
@@ -104,7 +104,7 @@ class CsvTable:
 
 @read_once(lambda path: [Path(path)])
 def read_table(path: str) -> CsvTable:
-    """Read a table; what stands in its cells is not judged.
+    """Read a table, without checking its cells.
 
     Raises:
         ConfigError: it cannot be read, is no text in UTF-8, has no header, or a row has more or

@@ -62,7 +62,7 @@ _SIGNS: Final = {
 
 
 def in_words(error: Any) -> tuple[str, Place]:
-    """Return what is wrong, and its line and column, from 1.
+    """Return the problem in words, and its line and column from 1.
 
     Args:
         error: Exception raised by ruamel, with its marks.
@@ -155,7 +155,7 @@ def load_yaml(path: str | Path) -> Document:
 
 
 def with_named_files(path: Path) -> list[Path]:
-    """Return a file and, if it is such a document, the files beside it that it names."""
+    """Return a file and, if it is a YAML document, the files beside it that it names."""
     if path.suffix not in SUFFIXES:
         return [path]
     try:
@@ -204,7 +204,7 @@ _VALUES = frozenset(
 
 
 class _PlainKinds(RoundTripConstructor):
-    """Makes nothing but text, numbers, yes and no, lists and mappings.
+    """Constructor of text, numbers, truth values, lists and mappings only.
 
     Else a tag such as `!!python/object` makes something that nobody expects further on.
     """

@@ -1,4 +1,4 @@
-"""CURVE keys of the devices, in a folder: who is who on an encrypted network.
+"""CURVE keys of the devices, in a folder: identities on an encrypted network.
 
 `public/` holds a file for each device and goes to every machine; `secret/` goes nowhere but to
 the machine that runs the device. The files have the form of ZeroMQ certificates.
@@ -190,7 +190,7 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
 
 
 def _create(folder: Path, device: str) -> bool:
-    """Make what is missing; whether a new pair was needed."""
+    """Create missing files; return True if a new pair was needed."""
     public_file = folder / "public" / f"{_stem(device)}.key"
     secret_file = _secret_file(folder, device)
     if public_file.exists():

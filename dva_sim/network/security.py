@@ -1,16 +1,15 @@
 """Sockets with keys, and a clear message at both ends when they do not match.
 
-Without keys a socket is only watched. With keys a socket that binds is a CURVE server with its
-device's own key, and one that connects knows the key of the device it wants to reach; who asks
-at a server must have a key of the ring. Nothing here waits or has a thread: the loop that polls
-all sockets passes those that are ready to `Security.handle`.
+Without keys sockets are only watched. With keys a socket that binds is a CURVE server with its
+device's own key; one that connects knows the key of the device it wants to reach, and needs a key
+that the server's ring holds. Nothing here waits or has a thread: the loop that polls all sockets
+passes those that are ready to `Security.handle`.
 
-When one end has keys and the other has none, each hangs up as soon as it sees that. The quicker
-one knows why, and the slower one may be cut off before it has read a word. So an end that was
-refused asks what listens at the endpoint, by the greeting of ZMTP 3 (RFC 37), slowly: it waits
-until it has heard the other end before it names its own mechanism, and never hangs up first on a
-stranger. What libzmq reports of a failed handshake says less at one end than at the other, and not
-the same each time: it is put into words as far as either end can know.
+If only one end has keys, each hangs up as soon as it notices. The quicker one knows why; the slower
+one may be cut off before it has read anything. So an end that was refused probes the endpoint with
+the greeting of ZMTP 3 (RFC 37), slowly: it waits for the other end's greeting before it names its
+own mechanism, and never hangs up first. libzmq's reports of failed handshakes differ between the
+ends and from time to time; they are put into words as far as each end can know the reason.
 """
 
 from __future__ import annotations

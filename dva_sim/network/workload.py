@@ -1,4 +1,4 @@
-"""The programs of an operator and a robot: what is sent when, obeyed, and noted.
+"""Programs of an operator and a robot: messages sent, obeyed and recorded.
 
 They are the same on every carrier: the virtual network, ZeroMQ sockets, real middleware and models
 of it. A carrier gives the operator an `OperatorEnd`; one that transports messages has those below,

@@ -41,7 +41,7 @@ class SetDispatch:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledge:
-    """Somebody has seen an event, and answers for it from now on."""
+    """Acknowledge an event, and take responsibility for it."""
 
     event_id: int
 
@@ -56,8 +56,8 @@ class Assign:
         operator: Id of the device that is to drive the robot; None: the DVA chooses.
         task: Task as in `Order`; None: `confirm`.
         reason: Reason in words.
-        decisions: `EventStatus.decisions` as the sender has seen it; who has not, cannot take
-            an event out of somebody's hands. Where it is not the newest, nothing is done.
+        decisions: `EventStatus.decisions` as the sender has seen it; without it no event can be
+            taken from a device. If it is outdated, nothing is done.
     """
 
     event_id: int
@@ -87,7 +87,7 @@ class TakeOff:
 
 @dataclass(frozen=True, slots=True)
 class FalseAlarm:
-    """There is nothing: the event is over, as if somebody there had refuted it.
+    """Close an event as a false alarm, as if a device there had refuted it.
 
     Attributes:
         event_id: The event.
@@ -102,7 +102,7 @@ class FalseAlarm:
 
 @dataclass(frozen=True, slots=True)
 class Escalate:
-    """Others than the DVA's own have to deal with an event, from now on.
+    """Escalate an event to others than the DVA's own devices.
 
     Attributes:
         event_id: The event.

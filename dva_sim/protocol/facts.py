@@ -61,7 +61,7 @@ class Fact:
 
     @property
     def overrides(self) -> bool:
-        """True if a person sent somebody else than the policy would have sent."""
+        """True if a person sent another device than the policy would have sent."""
         done = self.action == "assign" and self.code == m.OK and self.role is not None
         return done and self.device != self.advised
 

@@ -92,10 +92,7 @@ def bounds(name: str) -> tuple[float, float]:
 
 
 def children(element: etree._Element) -> list[etree._Element]:
-    """Return the elements that an element may hold, in their order.
-
-    Those of a choice one by one.
-    """
+    """Return the elements that an element may hold, in order, with all of a choice."""
     return list(_below(element))
 
 

@@ -108,9 +108,9 @@ class StartTeleOp:
 
 
 class SetTeleOp(NamedTuple):
-    """Drive so until the next command.
+    """Drive at this speed and turn rate until the next command.
 
-    It is made so often that it is a named tuple, as the message around it: that takes a third.
+    It is made so often that it is a named tuple, like the message around it: a third of the time.
 
     Attributes:
         speed: Forward speed [m/s].
@@ -241,7 +241,7 @@ class SensorValue:
 
 @dataclass(frozen=True, slots=True)
 class GetDeviceList:
-    """Ask the DVA who is registered; answered with `DeviceList`."""
+    """Ask the DVA for the registered devices; answered with `DeviceList`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +286,7 @@ class HandoverRequest:
 
 @dataclass(frozen=True, slots=True)
 class GetGrant:
-    """A robot asks the DVA who may act on it: it takes nobody else's word for that.
+    """A robot asks the DVA who may act on it, and trusts no other source.
 
     Attributes:
         holder: The device asked about; None: the current holder.
@@ -468,7 +468,7 @@ class SensorInfo:
 
 @dataclass(frozen=True, slots=True)
 class DeviceSensors:
-    """One line of the sensor list: what a device can show, its camera if it has one."""
+    """Entry of the sensor list: the sensors of a device, and its camera if it has one."""
 
     device: str
     camera_url: str | None
@@ -507,7 +507,7 @@ class Permission:
         level: Level as in `PermissionGrant`.
         session: The fencing token, at least 1.
         address: Address at which the robot takes requests, if the DVA knows it.
-        sensors: Names of the sensors to which one may subscribe; at most 16.
+        sensors: Names of the sensors to which the device may subscribe; at most 16.
     """
 
     device: str

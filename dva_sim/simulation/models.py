@@ -109,7 +109,7 @@ class Model(Generic[S]):
         """
 
     def lacks(self, scenario: S) -> str:
-        """Return one line that says what a run needs and this machine lacks; empty if nothing."""
+        """Return, in one line, what this machine lacks for a run; empty if nothing."""
         return ""
 
     def contradictions(self, scenario: S) -> list[str]:

@@ -69,7 +69,7 @@ class DvaLives:
         return memory
 
     def _between_writes(self) -> None:
-        """Fail as the disk does, or end the process."""
+        """Raise what a full disk or a kill at this write would cause."""
         if self._writes_left is not None:
             self._writes_left -= 1
             if self._writes_left < 0:

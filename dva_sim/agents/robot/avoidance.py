@@ -147,7 +147,7 @@ class Avoidance:
         """Return where lanes `(k, n, 2)` have room; the planned path has as much as there is."""
         room = self.room_at(points.reshape(-1, 2)).reshape(points.shape[:2])
         needed = np.minimum(self.radius + LANE_ROOM, np.maximum(self.room_at(base), self.radius))
-        needed = np.minimum(needed, room[:, :1] + STEP)  # who is too near already may get away
+        needed = np.minimum(needed, room[:, :1] + STEP)  # a robot already too near may move away
         keeps = room >= needed - 1e-9
         keeps[0] = True
         return keeps

@@ -289,7 +289,7 @@ class RobotController:
         return Decision(m.OK, "stopped", STANDSTILL)
 
     def release_by_hand(self, label: str) -> Decision:
-        """Release the robot after an emergency: somebody stands beside it and sees that it may."""
+        """Release the robot after an emergency, by a person who stands beside it."""
         if not self.latch.holds:
             return Decision(m.WRONG_MODE, "no emergency has stopped it")
         self.latch.release(m.ByWhom(self.id_tag, label, 0.0))

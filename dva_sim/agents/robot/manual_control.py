@@ -25,7 +25,7 @@ class ManualControl:
         return self._robot.controller
 
     def take(self, who: str) -> Decision:
-        """Let a person take the robot in hand, if it is idle and nobody holds it."""
+        """Give a person manual control of the robot, if it is idle and nobody holds it."""
         robot = self._robot
         now = self._robot.device.clock.now
         if robot.device.silent or not robot.body.powered:

@@ -12,7 +12,7 @@ from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, 
 
 
 class Free:
-    """Responders available in one decision: each idle one once, robots while operators last.
+    """Responders available in one decision: each idle one once, robots only with a free operator.
 
     Attributes:
         robots: True for responders that are robots, shape `(responders,)`.

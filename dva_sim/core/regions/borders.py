@@ -25,7 +25,7 @@ BACK: Final = 60.0  # design: pause after a guard was sent back, and is not ther
 
 @dataclass
 class Borders:
-    """Watches where devices are, and hands over those that are elsewhere and free.
+    """Handover of free devices to the DVA in whose region they are.
 
     Attributes:
         division: Division of the site, with the service of each region.
@@ -89,7 +89,7 @@ class Borders:
         return idle and not is_held and device not in self.orders.engaged
 
     def _hand_over(self, entry: DeviceEntry, now: float) -> list[Send]:
-        """Ask a device to register with the DVA of its place, if that one is there."""
+        """Ask a device to register with the DVA of its region, if that DVA is reachable."""
         assert entry.position is not None
         return self._send(entry, self.division.dva_at(entry.position), now)
 

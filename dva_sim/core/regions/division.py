@@ -1,4 +1,4 @@
-"""Division of a site into regions, and who serves which of them, as one DVA knows it."""
+"""Division of a site into regions, and the DVAs that serve them, as one DVA knows it."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class MutualHelp:
     # --- asked for -----------------------------------------------------------------------
 
     def ask(self, now: float) -> list[Send]:
-        """Ask other DVAs for help with what has waited and nobody here is free for."""
+        """Ask other DVAs for help with waiting events for which nobody here is free."""
         orders = self.dispatcher.orders
         waiting = [e for e in orders.events.waiting.values() if self._needs_help(e, now)]
         if not waiting or self.dispatcher.situations.idle(now):
@@ -113,7 +113,7 @@ class MutualHelp:
         return self.dispatcher.orders.transition(copy, cause, now)
 
     def adopt(self, number: int) -> None:
-        """Keep a copy as an event of one's own: the DVA that asked for help is gone."""
+        """Keep a copy as an event of this DVA: the one that asked for help is gone."""
         self.adopted.add(number)
         self._drop(number)
 
@@ -134,7 +134,7 @@ class MutualHelp:
         return [Send(lent.asker, m.OrderProgress(lent.number, "failed"))]
 
     def news(self) -> list[Send]:
-        """Return what askers have not been told yet of the events that are looked at for them."""
+        """Return the news of events handled for other DVAs that those have not received yet."""
         orders = self.dispatcher.orders
         sends = []
         for number, lent in list(self.copies.items()):

@@ -1,4 +1,4 @@
-"""Leases: permissions of a DVA that has died, which hold on at the one that its robots come to."""
+"""Leases: permissions of a dead DVA, which stay valid at the DVA that takes over its robots."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dva_sim.protocol.exchange import LOW_BITS, is_absurd
 
 @dataclass
 class Leases:
-    """Keeps the permissions that robots bring with them, as long as their holders come, too.
+    """Permissions that robots bring with them, valid if their holders register here, too.
 
-    A robot speaks for itself alone: what it brings takes nothing from anybody.
+    A robot can bring only permissions on itself, so it takes nothing from others.
 
     Attributes:
         registry: Devices that are registered here.
@@ -23,10 +23,10 @@ class Leases:
 
     registry: Registry
     sessions: Sessions
-    _brought: dict[int, float] = field(default_factory=dict)  # when, by session [s]
+    _brought: dict[int, float] = field(default_factory=dict)  # time of arrival by session [s]
 
     def bring(self, robot: str, body: m.GetGrant, session: int, now: float) -> None:
-        """Let a permission hold that another DVA has given; later sessions are above it."""
+        """Accept a permission that another DVA has given; later sessions are above it."""
         permissions = self.sessions.permissions
         if body.holder is None or body.level in (None, "sensors") or robot in permissions.grants:
             return

@@ -23,12 +23,12 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import PEER, ROBOT, ControlRoomRole
 
 FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
-NUMBERS = 1_000_000  # of events that one DVA gives: no two give the same
-LIFE = 10_000  # of them that it gives from one start to the next
+NUMBERS = 1_000_000  # event numbers reserved for each DVA, so that no two give the same
+LIFE = 10_000  # event numbers reserved for each start of a DVA
 
 
 class RegionalDva(Dva):
-    """The core of a DVA among others; all else is as in `Dva`.
+    """Core of a DVA among others; everything else is as in `Dva`.
 
     Args:
         *args: Arguments of `Dva`.
@@ -74,7 +74,7 @@ class RegionalDva(Dva):
         return self.division.other_at(body.position, self.registry)
 
     def replica_of(self, event: Event, fact: int, now: float) -> tuple[str, m.Replicate] | None:
-        """Return the deputy and what it has to know of an event; None if nobody has to."""
+        """Return the deputy of an event and the message to it; None if there is none."""
         region = self.division.region_at(event.position)
         epoch, dva = self.division.claims[region]
         deputy = self.division.deputy_of(region, self.registry)
@@ -83,7 +83,7 @@ class RegionalDva(Dva):
         return deputy, m.Replicate(region, epoch, fact, status_of(event, None, now))
 
     def peer_status(self, now: float) -> m.PeerStatus:
-        """Return what others have to know of this DVA."""
+        """Return the status of this DVA for the others."""
         served = tuple(m.ServedRegion(*each) for each in self.division.served())
         count = sum(not entry.silent for entry in self.registry.entries.values())
         idle = len(self.dispatcher.situations.idle(now))
@@ -92,7 +92,7 @@ class RegionalDva(Dva):
     # --- what comes in --------------------------------------------------------------------
 
     def note(self, message: m.Message, now: float) -> list[Send]:
-        """Take a published message, as in `Dva`; of other DVAs what they serve."""
+        """Take a published message, as in `Dva`; note the regions that other DVAs serve."""
         body = message.body
         if isinstance(body, m.PeerStatus):
             return self._with_revocations(self._hears_of(message.source, body, now))
@@ -121,7 +121,7 @@ class RegionalDva(Dva):
         return [] if is_later else super().undelivered(send, now)
 
     def _gone(self, device: str, now: float) -> list[Send]:
-        """Leave a device that is silent, as in `Dva`; another DVA hears later what is over."""
+        """Drop a silent device, as in `Dva`; tell another DVA later what has ended."""
         if device in self.division.peers:
             over = [m.OrderProgress(e.number, "done") for e in self.orders.engaged.all(device)]
             self.help.unheard.setdefault(device, []).extend(Send(device, body) for body in over)
@@ -214,7 +214,7 @@ class RegionalDva(Dva):
                 self.events.touch(event)
 
     def _is_no_news(self, report: m.EventReport, now: float) -> bool:
-        """Return True if somebody has found the same event here lately."""
+        """Return True if the same event was found here recently."""
         lately = (e for e in self.events.closed.values() if now - e.times["closed"] < NO_NEWS)
         confirmed = (e for e in lately if e.state in FOUND and e.kind == report.kind)
         near = self.events.merge_distance
@@ -236,7 +236,7 @@ class RegionalDva(Dva):
         return sends + (self._yields(lost, now) if lost else [])
 
     def _yields(self, regions: list[str], now: float) -> list[Send]:
-        """Serve regions no longer; their events are passed on."""
+        """Stop serving regions, and pass their events on."""
         self.orders.counters["region yielded"] += len(regions)
         self.returns.yielded(regions)
         return self.strays.pass_on(now)
@@ -266,5 +266,5 @@ class RegionalDva(Dva):
         return body.device in self._strangers and body.level != "sensors"
 
     def _with_revocations(self, sends: Iterable[Send]) -> list[Send]:
-        """Return the messages as `Dva` does, and the news for those who asked for help."""
+        """Return the messages as `Dva` does, and the news for DVAs that asked for help."""
         return [*super()._with_revocations(sends), *self.help.news()]

@@ -54,7 +54,7 @@ class Strays:
         return sends
 
     def taken(self, send: Send, now: float) -> list[Send]:
-        """Close a stray that the DVA of its place has taken; who was sent there is called back."""
+        """Close a stray that the DVA of its region has accepted; recall its responders."""
         event = self.orders.events.open.get(self._sends.pop(send, 0))
         if event is None or not self._may_go(event):
             return []

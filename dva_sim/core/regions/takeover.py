@@ -15,7 +15,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.wire_size import sent_time
 
-COME_WITHIN: Final = 4.0  # design: a responder that has not come by then is given up [s]
+COME_WITHIN: Final = 4.0  # design: a responder not registered within this time is given up [s]
 MAX_COPIES: Final = 10_000  # of the events of one region
 _OF_A_PLACE: Final = PEER, DETECTOR, ROBOT, GUARD
 

@@ -1,4 +1,4 @@
-"""A declared contrast as it was measured, and the answer that a reader takes home of it."""
+"""Declared contrast as measured, and the answer that follows from it."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from dva_sim.experiments.results.results import Frame
 
 
 class Comparison(MatchedResults):
-    """Two results folders, matched, and what is different between them."""
+    """Comparison of two results folders, run by run."""
 
     def differences(
         self, measure: str | None = None, by: Sequence[str] | None = ()

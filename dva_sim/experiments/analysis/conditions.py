@@ -1,4 +1,4 @@
-"""The conditions of a study: what was the same for everything that is compared."""
+"""Conditions of a study: the settings that were equal for all compared levels."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _usual(of: Callable[[str], Any]) -> float | None:
 
 
 def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
-    """Return the round trip, and what the first answer over a new connection takes [s]."""
+    """Return the round trip, and the time to the first answer over a new connection [s]."""
     delay = of("link.delay_s")
     processing = of("robot.processing_s")
     ways = (of(f"link.{direction}.delay_s") for direction in ("up", "down"))

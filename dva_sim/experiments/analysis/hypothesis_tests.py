@@ -70,7 +70,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Tested:
-    """A hypothesis beside what came out.
+    """Hypothesis with its result.
 
     Attributes:
         name: Name of the hypothesis.
@@ -106,7 +106,7 @@ class Judgement(NamedTuple):
 
 
 def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
-    """Return every comparison and every hypothesis, as the manifest has them, and what came out.
+    """Return the comparisons and hypotheses of the manifest, with their results.
 
     All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
     what speaks against hypotheses is adjusted among its own.

@@ -390,7 +390,7 @@ class MatchedResults:
         return self._frames[key]
 
     def refuse_distrusted(self) -> None:
-        """Refuse to judge what a user's class did that failed: the default did it.
+        """Refuse to judge runs in which a user's class failed and the default took its place.
 
         Raises:
             ConfigError: there is such a part.

@@ -42,7 +42,7 @@ Marks = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Support:
-    """The delays of a part's cells, and which of them no published data cover.
+    """Delays of a part's cells, and those that no published data cover.
 
     Attributes:
         delays: Delay of the loop without the person, by cell `(levels of factor 1, ...)` [s]; nan
@@ -180,7 +180,7 @@ class RepeatedStop:
 
     @property
     def same_sign(self) -> int:
-        """In how many of the others the effect has the sign of the study's own."""
+        """Number of other repeats in which the effect has the sign of the study's own."""
         return sum(r.mean * self.found > 0 for r in self.others)
 
     @property
@@ -271,7 +271,7 @@ def robustness_of(
 
 
 class _Reading:
-    """The repeats of a study, and what is known of each besides its effect."""
+    """Repeats of a study, with the properties of each besides its effect."""
 
     def __init__(self, part: RunGrid, finding: Finding, scenario: Mapping[str, Any]) -> None:
         self.part = part
@@ -352,7 +352,7 @@ def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
 
 
 def _beside(finding: Finding, at: int, change: Floats) -> Interval | None:
-    """Return the study's own result and what a model changes of it, `(persons, trials)`."""
+    """Return the study's own result and a model's change of it, `(persons, trials)`."""
     changed = interval_of(change)
     if changed is None or not np.isfinite(changed.low):
         return None

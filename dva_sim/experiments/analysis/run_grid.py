@@ -1,4 +1,4 @@
-"""From the table of runs to paired effects: who is compared with whom, and along what.
+"""Grid of runs, from their table to paired effects along the levels of a factor.
 
 The runs of a part are laid out as a grid: one axis per factor, then person, then trial.
 Subtracting two slices of it pairs them by person and trial, which is the whole method.
@@ -180,7 +180,7 @@ def person_means(values: Floats) -> Floats:
 
 
 def nan_mean(values: Floats, axis: int) -> Floats:
-    """Return the mean of what is there; nan, in silence, where nothing is."""
+    """Return the mean of the finite values; NaN without a warning if there is none."""
     is_finite = np.isfinite(values)
     count = is_finite.sum(axis=axis)
     total = np.where(is_finite, values, 0.0).sum(axis=axis)

@@ -105,7 +105,7 @@ class Checkpoint:
             )
 
     def _connected(self, must_exist: bool) -> sqlite3.Connection:
-        """Read only where nothing else is possible: what was written last may be missing then."""
+        """Open read-only if nothing else is possible; the last entries may then be missing."""
         file = f"{self.path.absolute().as_uri()}?mode={'rw' if must_exist else 'rwc'}"
         if must_exist and not os.access(self.path.parent, os.W_OK):
             file = f"{self.path.absolute().as_uri()}?mode=ro&immutable=1"
@@ -177,7 +177,7 @@ class Checkpoint:
                     raise
 
     def describe(self, manifest: Mapping[str, Any]) -> None:
-        """Keep what the study is, so that it can be read from here before it is complete.
+        """Keep the definition of the study, so that it can be read here before it is complete.
 
         Raises:
             DvaSimError: the disk is full, or another program holds the checkpoint.
@@ -224,7 +224,7 @@ class Checkpoint:
 
     @contextmanager
     def _readable_errors(self) -> Iterator[None]:
-        """Turn what a user can mend into one line."""
+        """Turn errors that a user can mend into one line."""
         try:
             yield
         except sqlite3.OperationalError as error:

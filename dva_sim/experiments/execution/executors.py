@@ -55,7 +55,7 @@ class WorkerProcess:
         self._file.write(pickle.dumps(sys.path))
 
     def call(self, task: Callable[[], Any]) -> Any:
-        """Have a task done, which is pickled, and so is what it returns.
+        """Run a task in a worker; the task and its result are pickled.
 
         Raises:
             WorkerDied: it ended meanwhile, or what it was given is not known there.
@@ -94,7 +94,7 @@ R = TypeVar("R")
 
 
 class WorkersLost(RunsFailed):
-    """Nobody is left to run anything; what has been run is kept."""
+    """Error: no worker is left; finished runs are kept."""
 
 
 class Workers(ABC):
@@ -173,7 +173,7 @@ class ThisProcess(Workers):
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
-        """Yield one that has done what it is given when `submit` returns."""
+        """Yield an executor whose `submit` runs the task before it returns."""
         yield _AtOnce()
 
 
@@ -264,7 +264,7 @@ class LocalProcesses(Workers):
 
     @override
     def look_after(self, is_idle: bool) -> None:
-        """End a process that has been stopped for some time: another one does what it had.
+        """End a process that has been stopped for some time; another one takes its task.
 
         Raises:
             KeyboardInterrupt: Ctrl-C was pressed.
@@ -277,7 +277,7 @@ class LocalProcesses(Workers):
 
 
 class _Handing(ThreadPoolExecutor):
-    """Threads that hand on what they are given."""
+    """Threads that pass tasks on to workers."""
 
     def __init__(self, do: Callable[[Callable[[], Any]], Any], width: int, *initial: Any) -> None:
         super().__init__(width, "worker", *initial)

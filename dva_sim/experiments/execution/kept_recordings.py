@@ -138,7 +138,7 @@ def badness(measure: str, row: Row) -> float:
 
 
 def _tidied(folder: Path, recordings: Iterable[str]) -> Path:
-    """Return the folder without what an earlier choice or a killed process has left."""
+    """Return the folder, cleared of files of earlier choices and killed processes."""
     try:
         folder.mkdir(exist_ok=True)
         names = set(recordings)

@@ -102,7 +102,7 @@ class KeptRun:
         self._waiting.put(lines)
 
     def close(self) -> None:
-        """Write what still waits, and make the tables.
+        """Write all pending entries, and make the tables.
 
         Raises:
             DvaSimError: the disk is full or cannot be written; what is in the journal is kept.
@@ -190,7 +190,7 @@ def is_left(folder: Path) -> bool:
 
 
 def complete(folder: Path) -> None:
-    """Make the tables that are missing of a run that was killed, if there is one.
+    """Make the missing tables of a killed run, if there is one.
 
     The manifest's `partial` names the tables that cannot be made.
 

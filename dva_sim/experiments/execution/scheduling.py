@@ -159,7 +159,7 @@ def _together(
     workers: Workers,
     pace: _Pace,
 ) -> _Batches:
-    """Run what waits until a worker dies; what was under way then becomes suspect."""
+    """Run the waiting jobs until a worker dies; jobs under way then become suspects."""
     if not waiting:
         return
     with workers.executor(workers.width, episode) as executor:
@@ -217,7 +217,7 @@ def run_job(job: StudyJob, measures: Sequence[str] = ()) -> Tables:
 
 @contextmanager
 def limited(seconds: float, may_exit: bool) -> Iterator[None]:
-    """Let the block take so long at most [s], by the wall clock.
+    """Limit the wall-clock time of the block [s].
 
     Time in which the whole process was stopped (Ctrl-Z) does not count. Python code is ended by
     an exception, again and again until it gives in. Code that never comes back to Python cannot

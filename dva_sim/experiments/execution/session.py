@@ -88,7 +88,7 @@ def open_session(
 
 
 class StudySession:
-    """The runs that a results folder holds of a study, and workers for the others.
+    """Session of a study: the runs in its results folder, and workers for the missing ones.
 
     Attributes:
         count: Number of runs that are kept.
@@ -138,7 +138,7 @@ class StudySession:
         return budget is not None and self.journal.wall_s >= budget
 
     def run(self, jobs: Sequence[StudyJob]) -> None:
-        """Make some runs; what comes together is in the journal before it is counted."""
+        """Make some runs; each batch is in the journal before it is counted."""
         clock = time.perf_counter()
         batches = scheduling.run_all(jobs, self.episode, self._workers, self.limit_s)
         with closing(batches):
@@ -167,7 +167,7 @@ class StudySession:
         return frame_of(list(rows))
 
     def write(self, batches: Sequence[Sequence[StudyJob]], stopped: dict[str, Any]) -> None:
-        """Write the tables of some batches, the manifest, and what it took on this machine.
+        """Write the tables of some batches, the manifest, and the cost on this machine.
 
         Tables and manifest are the same bytes wherever the runs were made.
 
@@ -249,7 +249,7 @@ def _is_written(out: Path, manifest: dict[str, Any]) -> bool:
 
 
 def _tidy(out: Path) -> None:
-    """Remove what a runner left behind that was killed while it wrote."""
+    """Remove files left by a runner that was killed while writing."""
     for path in out.glob(".tables-*"):
         shutil.rmtree(path, ignore_errors=True)
     for name in (MANIFEST, MACHINE):

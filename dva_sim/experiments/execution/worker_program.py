@@ -14,7 +14,7 @@ from contextlib import suppress
 
 
 def serve(number: int) -> None:
-    """Do what comes through a socket, until that is closed at the other end."""
+    """Run tasks from a socket until the other end closes it."""
     with socket.socket(fileno=number) as channel, channel.makefile("rwb") as file:
         threading.Thread(target=_end_with_parent, args=(number,), daemon=True).start()
         with suppress(EOFError, ConnectionError):

@@ -36,7 +36,7 @@ _MAX_KEYS = 5
 
 
 def depends(reading: ResultsReading) -> dict[str, str]:
-    """Return what each sentence depends on; only what can be told of this study."""
+    """Return the conditions of each sentence, as far as this study shows them."""
     view = reading.view
     finding = reading.finding
     if view is None or finding is None:
@@ -85,7 +85,7 @@ def _waiting(view: StudyView, finding: Finding) -> Iterator[str]:
 
 
 def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
-    """Return the answer under the other settings that were run, and what was not varied at all."""
+    """Return the answer under the other settings, and the settings that were not varied."""
     stop = telling_stop(finding)
     other_panels = view.panels[1:] if finding.within and stop is not None else []
     differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in other_panels]
@@ -208,7 +208,7 @@ def _typical(law: Mapping[str, Any]) -> float:
 
 
 def _hidden(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> list[Unnoticed]:
-    """Return hidden effects; nothing where the scenario or its site is not as it was."""
+    """Return hidden effects; nothing if the scenario or its site has changed."""
     streams = [{k: v for k, v in stream.items() if v != ""} for stream in scenario["demand"]]
     try:
         scenario_model = TimedScenario.model_validate(dict(scenario) | {"demand": streams})

@@ -24,7 +24,7 @@ _SMALLEST_PRINTED = 0.01  # that is not printed as zero
 
 
 def answer(finding: Finding) -> Answer:
-    """Say which side is ahead and by how much, then where it holds and what it depends on."""
+    """Return the leading side and its lead, then where that holds and what it depends on."""
     f = finding
     measured = sentence(
         "measured",
@@ -79,7 +79,7 @@ def _difference(f: Finding, stop: int) -> Iterator[str]:
 
 
 def _no_difference(f: Finding) -> Iterator[str]:
-    """Yield what is excluded or left open, then the same of the other levels."""
+    """Yield what is excluded or left open at the leading level, then at the others."""
     is_settled = f.holds_zero & (f.bounds > 0)
     chosen = f.is_open if f.has_too_few else is_settled if is_settled.any() else f.holds_zero
     unsure = f.is_open if f.has_too_few else f.holds_zero

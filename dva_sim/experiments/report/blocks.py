@@ -89,14 +89,14 @@ class FigureBlock:
 
 @dataclass(frozen=True)
 class Verbatim:
-    """Text to be kept as it is."""
+    """Preformatted text."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Words and what they mean."""
+    """Terms with their meanings."""
 
     entries: tuple[tuple[str, str], ...]
 
@@ -156,7 +156,7 @@ class Term:
 
 
 def _all() -> Iterator[Term]:
-    """Yield patterns by either of their names, and what stands in `words.yaml`."""
+    """Yield patterns under both of their names, and the terms of `words.yaml`."""
     for kind in PATTERNS.values():
         yield Term(
             kind.title, meaning_of(kind), f"\\b(?:{re.escape(kind.title)}|{re.escape(kind.label)})"

@@ -119,7 +119,7 @@ def cell_table(
 
 
 def _constant(table: CellTable) -> list[int]:
-    """Return columns of which every row says the same; of a single row, none."""
+    """Return the columns with equal values in all rows; none for a single row."""
     columns = range(table.labels, len(table.heads))
     if len(table.rows) < _MIN_ROWS:
         return []
@@ -168,7 +168,7 @@ _ENDINGS = {
 
 
 def _endings(part: RunGrid) -> Iterator[_Column]:
-    """Yield the share confirmed, and how the last drives of the others ended."""
+    """Yield the share confirmed, and the endings of the last drives to other events."""
     if not part.has("confirmed"):
         return
     grid = part.grid("confirmed")

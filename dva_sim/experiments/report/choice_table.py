@@ -19,7 +19,7 @@ WORST = "worst of these"
 
 
 def choice_table(choice_map: ChoiceMap, part: str) -> CellTable:
-    """Return the best choices in each situation, and what each other one costs beyond them.
+    """Return the best choices in each situation, and the additional cost of the others.
 
     A row is a situation, or a choice where those are more.
     """

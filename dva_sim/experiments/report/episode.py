@@ -1,4 +1,4 @@
-"""One run of a scenario as somebody asks for it: changed, played, drawn and kept.
+"""Single run of a scenario on request: changed, played, drawn and kept.
 
 Nothing is printed here; functions return lines about the files written.
 """
@@ -122,7 +122,7 @@ class EpisodeRequest:
         return Played(scenario, self.seed, run, time.perf_counter() - started)
 
     def write(self, runs: Sequence[Played]) -> Iterator[str]:
-        """Write what is asked for, and say of each what it is and where.
+        """Write the requested files; return a line with the kind and path of each.
 
         Raises:
             ConfigError: a moment after the run ended, or a file that cannot be written.

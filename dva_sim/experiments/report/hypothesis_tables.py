@@ -36,7 +36,7 @@ _MIN_P = 0.001
 
 
 def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellTable:
-    """Return each hypothesis: the claim, what was found, the adjusted test, the verdict."""
+    """Return each hypothesis: the claim, the result, the adjusted test, the verdict."""
     heads = ["hypothesis", "claim", "found (interval at the level of the verdict)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
     rows = [
@@ -228,7 +228,7 @@ _CLAIMS = ("hypotheses", "answer", "comparisons")
 
 
 def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -> CellTable:
-    """Return line by line what was registered, beside what was run.
+    """Return the registration line by line, beside the study that was run.
 
     The claims are those registered, also where the study as run has others.
 
@@ -262,7 +262,7 @@ def _size(study: Mapping[str, Any], persons: int | None) -> str:
 
 
 def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
-    """Yield the bound that each hypothesis was to be tested against, and what came out."""
+    """Yield the bound of each hypothesis, and its result."""
     for tested in judged(study, runs).tested if runs else ():
         yield [f"hypothesis {tested.name}", bound_of(tested), verdict_with_interval(tested)]
 

@@ -164,7 +164,7 @@ def _table(reading: Reading, of_map: Callable[[ChoiceMap, str], CellTable]) -> T
 
 
 def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
-    """Name what has changed in a study since it was run; empty if nothing has.
+    """Return the changes of a study since it was run, in words; empty if there are none.
 
     The question may be worded otherwise: no run depends on it.
 
@@ -208,7 +208,7 @@ def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
 
 
 def _is_equal(cell: Any, value: Any) -> bool:
-    """Compare a cell of a table with what it was written from; what is missing there is nan."""
+    """Return True if a table's cell equals a value; a missing value is NaN."""
     if value is None or value != value:
         return cell is None or cell != cell
     return bool(cell == value)

@@ -339,7 +339,7 @@ FIGURES = "figures"
 
 
 def write_report(folder: Path, pdf: bool = False) -> Path:
-    """Make `report.html` and `figures/` from what lies in a results folder.
+    """Make `report.html` and `figures/` from a results folder.
 
     For an unfinished study, the page shows the results so far.
 

@@ -111,7 +111,7 @@ class ResultsReading:
 
     @cached_property
     def distrusted(self) -> dict[str, str]:
-        """See `Results`: parts of which no contrast is shown."""
+        """Parts without a contrast; see `Results`."""
         return self.results.distrusted
 
     @cached_property

@@ -81,7 +81,7 @@ class ShiftPage(ModelPage):
         return replace(finding, cluster="shift")
 
     def answer(self, finding: Finding | None) -> Answer:
-        """Return the declared contrast first; then what it is paid with, and what was best."""
+        """Return the declared contrast, then its cost, and the best policy."""
         if finding is None:
             return Answer(
                 "No contrast was declared that could answer the question; figures show the runs.",

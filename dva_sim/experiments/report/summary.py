@@ -71,7 +71,7 @@ class Reading(ResultsReading):
 
     @property
     def _why_nothing(self) -> Sequence[str]:
-        """A note on a contrast of which every pair of runs gives the same value."""
+        """Note on a contrast with the same value in every pair of runs."""
         finding = self.finding
         view = self.view
         if finding is None or view is None or np.nanmax(finding.bounds, initial=-1.0) != 0.0:
@@ -115,7 +115,7 @@ class Reading(ResultsReading):
 
     @property
     def _trusted(self) -> Table:
-        """The runs of all parts but those that are distrusted; empty without any."""
+        """Runs of all parts except distrusted ones; empty if there are none."""
         parts = np.asarray(self.runs["part"]) if self.runs else np.empty(0)
         is_trusted = ~np.isin(parts, list(self.distrusted))
         return (

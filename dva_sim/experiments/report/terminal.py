@@ -92,7 +92,7 @@ def show_table(results: Results, name: str, rows: int, console: Console) -> None
 
 
 def show_columns(results: Results, tables: Sequence[str], console: Console) -> None:
-    """Print what the columns of some tables mean; of all tables by default.
+    """Print the meanings of the columns of some tables, by default of all.
 
     Raises:
         ConfigError: no such table.
@@ -123,7 +123,7 @@ def program(results: Results) -> str:
 def print_table(
     heads: Sequence[str], rows: Sequence[Sequence[str]], console: Console, labels: int = 0
 ) -> None:
-    """Print columns side by side as far as there is room; the names of the others in a line.
+    """Print as many columns as fit side by side, and the names of the rest in a line.
 
     Args:
         heads: Column headings.

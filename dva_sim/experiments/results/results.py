@@ -178,7 +178,7 @@ class Frame(dict[str, Array]):
 
 
 def frame_of(rows: Sequence[Mapping[str, Any]]) -> Frame:
-    """Return rows as columns; what a row does not say is missing."""
+    """Return rows as columns; values absent from a row are missing."""
     names = dict.fromkeys(name for row in rows for name in row)
     return Frame({name: _column([row.get(name) for row in rows]) for name in names})
 
@@ -193,7 +193,7 @@ def _column(values: list[Any]) -> Array:
 
 
 def plain(value: Any) -> str:
-    """Return a value as text: four figures of a number, nothing for what is missing."""
+    """Return a value as text: four digits of a number, nothing for a missing value."""
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return ""
     if isinstance(value, bool | np.bool_):
@@ -218,7 +218,7 @@ def without_mask(column: Array) -> Array:
 
 
 def _masked(values: Array) -> Array:
-    """Return a column for duckdb, which takes what is masked for NULL."""
+    """Return a column for duckdb, with masked values as NULL."""
     if values.dtype.kind != "f":
         return values
     return np.ma.masked_array(values, mask=np.isnan(values))
@@ -301,7 +301,7 @@ class _Manifest(Config):
 
 
 def checked_manifest(manifest: Any, file: Path) -> dict[str, Any]:
-    """Return what was read as a manifest, if it has the form of one.
+    """Return the parsed data as a manifest, if it has the form of one.
 
     Keys of other versions of the program are let through.
 

@@ -171,7 +171,7 @@ class _Table:
         return path
 
     def _pass_on(self) -> None:
-        """Pass a batch of what waits to the database, as long as the table there fits."""
+        """Pass a batch of waiting rows to the database, as long as its table fits them."""
         batch = self._waiting[:_BATCH_ROWS]
         self._waiting = self._waiting[_BATCH_ROWS:]
         columns = dict.fromkeys(chain(self._seen, *batch))
@@ -204,7 +204,7 @@ def _sql_type(types: set[type]) -> str:
 
 
 def _array(values: list[Value], kind: str) -> NDArray[Any]:
-    """Return a column for DuckDB; what is missing is masked, and becomes NULL."""
+    """Return a column for DuckDB; missing values are masked, and become NULL."""
     if kind == "VARCHAR":
         texts = [v if v is None or isinstance(v, str) else str(v) for v in values]
         return np.array(texts, dtype=object)

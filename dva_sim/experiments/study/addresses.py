@@ -25,7 +25,7 @@ class Address(NamedTuple):
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
-        """Return address in a row of a table or of a manifest's cells."""
+        """Return the address in a row of a table or of a manifest's cells."""
         return cls(row["part"], row["cell"], row.get("person"), row.get("trial"))
 
     @classmethod

@@ -37,7 +37,7 @@ from dva_sim.simulation.run_measures import COVARIATES
 
 
 def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
-    """Return the mistake at what makes it; as it is if a file has been named.
+    """Return the mistake at its place in the study; unchanged if it names a file already.
 
     Args:
         study: Study that runs the scenario.
@@ -105,7 +105,7 @@ class DesignCell:
 
 @dataclass(frozen=True, slots=True)
 class StudyRun:
-    """One run of a study, by its place in the design.
+    """Run of a study, by its cell of the design.
 
     Attributes:
         part: Name of the part.

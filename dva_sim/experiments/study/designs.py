@@ -147,7 +147,7 @@ class Design(Config):
 def all_factors(
     design: Design | None, declared: Mapping[str, Levels], rows: Sequence[Row]
 ) -> dict[str, Levels]:
-    """Return every factor with its levels: those that the design brings first, then those declared.
+    """Return every factor with its levels: first those of the design, then declared ones.
 
     Listed levels come in the order met. Points in ranges have one factor, their number; so have
     listed rows whose levels are so many that their grid would be nearly empty.

@@ -133,7 +133,7 @@ def levels_of_cells(study: Study) -> Iterator[Row]:
 
 
 def levels_at_ends(study: Study) -> Iterator[Row]:
-    """Return levels with each range at either end, and the others at their middle.
+    """Return levels with one range at either end and all others at their middle.
 
     Which points are drawn depends on the seed; whether the ends are valid does not.
     """

@@ -109,7 +109,7 @@ def open_study(
     version: Version | None = None,
     pilot: int | None = None,
 ) -> Study:
-    """Return `load_study`, which tells of a file of another kind what it is.
+    """Return a study; for a file of another kind, report its kind.
 
     Raises:
         ConfigError: not found, not a study, not valid, or changes that make no sense.

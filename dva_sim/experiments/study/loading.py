@@ -160,7 +160,7 @@ def pairs_of(settings: Settings, seed: int | None = None) -> list[str]:
 
 
 def _as_text(key: str, value: Any) -> str:
-    """Return a value as YAML: words as they are where that is possible, all else as JSON."""
+    """Return a value as YAML: plain words where possible, otherwise JSON."""
     if isinstance(value, str | Path) and parse_scalar(str(value)) == str(value):
         return str(value)
     try:

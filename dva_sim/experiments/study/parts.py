@@ -1,4 +1,4 @@
-"""The keys of a study's file below its top level: what is asked, expected, tuned and repeated."""
+"""Keys of a study's file below its top level: answer, hypotheses, tuning and repeats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Registration: what a confirmatory run will be, fixed before anything of it is run.
+"""Registration of a confirmatory run, fixed before any of it is run.
 
 The hash of all that is fixed gives the run its seed. So it uses different persons and random
 numbers from any earlier run, and a study that is changed and registered again gets new ones.
@@ -61,7 +61,7 @@ class Preregistration(Config):
 
     @property
     def proper_hash(self) -> str:
-        """The hash of what it fixes."""
+        """Hash of the fixed keys."""
         return digest(self.model_dump(mode="json", include={"plan", "earlier"}))
 
     @property
@@ -90,7 +90,7 @@ def registration_of(study: Study) -> Preregistration | None:
 
 
 def register(study: Study, again: bool = False) -> str:
-    """Write down what the confirmatory run of a study will be, and say so.
+    """Write the registration of a study's confirmatory run, and return its lines.
 
     Args:
         study: Study as in its file, in one of its versions.
@@ -203,7 +203,7 @@ def _liberties(study: Study) -> Iterator[str]:
 
 
 def departures(registered: Preregistration, study: Study) -> Iterator[str]:
-    """Yield in what a study is not what was registered."""
+    """Yield the differences between a study and its registration."""
     if registered.hash != registered.proper_hash:
         yield "the registration was edited: its hash is not that of what it fixes"
     now = plan_of(study)

@@ -151,7 +151,7 @@ class Study(Config):
         return list(self.design.rows or ()) if self.design is not None else []
 
     def asked(self) -> dict[str, Any]:
-        """Return all keys that say what is run and how it is read, as JSON would hold them."""
+        """Return all keys that determine the runs and their analysis, as JSON data."""
         unasked = [key for key in ("measures", "covariates", "map") if not getattr(self, key)]
         apart = {"record", "screening", *VERSIONS, *unasked}
         return self.model_dump(mode="json", exclude=apart)
@@ -217,7 +217,7 @@ class Study(Config):
         )
 
     def setting_of(self, path: KeyPath) -> str | None:
-        """Return the last pair of `--set` that gives what stands at a key of the study."""
+        """Return the last `--set` pair that gives the value at a key of the study."""
         key = ".".join(map(str, path))
         for pair in reversed(self.settings):
             name = pair.partition("=")[0].strip()

@@ -83,7 +83,7 @@ class EmulatedLink(ABC, Generic[T]):
 
     @abstractmethod
     def _put(self, out: T, data: bytes) -> None:
-        """Hand on what is due."""
+        """Deliver the packets that are due."""
 
     def report(self, overrun: int = 0) -> LinkReport:
         """Count as far as it has come; chunks of a relay count as packets.

@@ -64,7 +64,7 @@ def become_owner(rootless: bool) -> str:
 
 
 def become_root_of_a_user_namespace() -> None:
-    """Be root among namespaces of one's own, and nowhere else.
+    """Become root inside new namespaces of this process only.
 
     Raises:
         OSError: forbidden here.
@@ -295,7 +295,7 @@ def _attribute(kind: int, value: bytes) -> bytes:
 
 
 def _ask_kernel(body: bytes, what: str) -> None:
-    """Send a route message; the kernel answers with an error number, 0 where it did it."""
+    """Send a route message; the kernel answers with an error number, 0 for success."""
     flags = _NLM_F_REQUEST | _NLM_F_ACK | _NLM_F_REPLACE | _NLM_F_CREATE
     header = struct.pack("IHHII", 16 + len(body), _RTM_NEWROUTE, flags, 1, 0)
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as netlink:

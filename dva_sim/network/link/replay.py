@@ -57,7 +57,7 @@ def moments_of(log: DelayLog) -> tuple[float, float]:
 
 
 def _filled(delays: Floats) -> Floats:
-    """Return delays with the last known one where a probe was lost."""
+    """Return the delays, with the last known one in place of each lost probe."""
     measured = np.flatnonzero(~np.isnan(delays))
     last = np.searchsorted(measured, np.arange(len(delays)), side="right") - 1
     return delays[measured[np.maximum(last, 0)]]

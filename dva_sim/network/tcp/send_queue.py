@@ -72,7 +72,7 @@ class SendBuffer:
 
     @property
     def has_room(self) -> bool:
-        """True if a third is free: what the kernel calls writable."""
+        """True if a third is free, when the kernel reports a socket as writable."""
         return 3 * self.used <= 2 * self.limit
 
     def take(self, count: int) -> int:

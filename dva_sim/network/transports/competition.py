@@ -1,4 +1,4 @@
-"""One teleoperation session beside TCP flows on one congested link: what came when, what was taken.
+"""Teleoperation session besides TCP flows on a congested link: arrivals, and the share of the rate.
 
 Each flow has a link of its own onto the same line, which is first-in-first-out with a drop-tail
 queue. If the queue is that of the end hosts themselves, packets of a flow with priority pass

@@ -58,7 +58,7 @@ class Aimd:
             self.rate += self.increase / round_trip
 
     def lost(self) -> None:
-        """Take in a loss; told once per round trip."""
+        """Take in a loss; called at most once per round trip."""
         self.rate = max((1.0 - self.decrease) * self.rate, 1.0 / self._last)
 
 

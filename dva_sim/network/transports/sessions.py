@@ -67,7 +67,7 @@ class DatagramSender:
         self.on_arrival: Callable[[], object] = lambda: None
 
     def offer(self, message: TransportMessage) -> None:
-        """Offer something to send; what has not begun to be sent is replaced by it."""
+        """Offer a message; it replaces one whose sending has not begun."""
         if message.crucial and self._repeats:
             self._crucial += parts_of(message, self._header)
         else:
@@ -75,7 +75,7 @@ class DatagramSender:
         self._pump()
 
     def hear(self, echoes: Sequence[Echo]) -> None:
-        """Hear from the other end what it has got."""
+        """Take an acknowledgement from the other end."""
         now = self._clock.now
         self._lose(now, self._feedback.acknowledged(now, echoes))
         self._pace.heard(now)

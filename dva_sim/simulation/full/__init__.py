@@ -1,4 +1,4 @@
-"""From a scenario and a seed to what happened."""
+"""Simulation of full scenarios: from a scenario and a seed to a recording."""
 
 from dva_sim.simulation.full.recording import Ending, Playback, Recording
 from dva_sim.simulation.full.run import rehearse, simulate

@@ -166,7 +166,7 @@ MOVED_SINCE = 2.0  # distance that a device may have moved since its last report
 
 
 def at_event_m(scenario: Scenario) -> float:
-    """Return from how far somebody may see what was reported somewhere [m].
+    """Return the distance from which a reported event may be seen [m].
 
     Guards and cameras see so far; reports nearer than may be merged are of one event.
     """

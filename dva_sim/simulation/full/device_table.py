@@ -48,7 +48,7 @@ class BookedDevice:
 
 
 class DeviceTable:
-    """The devices of a DVA, those that are there first.
+    """Table of a DVA's devices, present ones first.
 
     Args:
         dva: Function that returns the DVA: another one takes its place after a crash.

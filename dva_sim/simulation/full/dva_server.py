@@ -99,7 +99,7 @@ class DvaAgent:
         device.network.serve(device.id_tag, self._on_arrival)
 
     def start(self) -> None:
-        """Begin to look at deadlines; a memory tells what was going on before."""
+        """Begin to check deadlines, after restoring the state from memory."""
         clock = self.device.clock
         if self._memory is not None and self._memory.recall(self.core, clock.now):
             count = len(self.core.events.open)
@@ -224,7 +224,7 @@ class DvaAgent:
         return self._confirmed(message, reply)
 
     def _confirmed(self, message: m.Message, reply: m.Reply) -> m.Reply:
-        """Return the reply, or a refusal where it would confirm what the memory has not kept.
+        """Return the reply, or a refusal if it would confirm what was not saved.
 
         Requests other than for permissions are carried out all the same, and written as soon as
         possible: a report is acted on, and a session ends.
@@ -253,7 +253,7 @@ class DvaAgent:
             self._turned_away.popitem(last=False)
 
     def _attend(self) -> None:
-        """Listen to who is there, not to who is silent, and know nothing of who is forgotten."""
+        """Subscribe to present devices, not to silent ones, and drop forgotten ones."""
         registry = self.core.registry
         if registry.version == self._attended:
             return
@@ -318,7 +318,7 @@ class DvaAgent:
         return not self.is_gone
 
     def _carry_out(self, sends: list[Send]) -> None:
-        """Keep what has changed, then say it: what was said must not be forgotten."""
+        """Save changes, then publish them: nothing published may be lost in a crash."""
         self._keep_changes()
         self._count_failures()
         for send in sends:
@@ -364,7 +364,7 @@ class DvaAgent:
         self._publish_news(changed)
 
     def _publish_news(self, changed: Iterable[Event]) -> None:
-        """Publish what is new, if anybody may listen for it; facts are kept anyway."""
+        """Publish news if there may be listeners; facts are kept anyway."""
         core = self.core
         now = self.device.clock.now
         facts = self.core.trail.take()
@@ -382,7 +382,7 @@ class DvaAgent:
             self.device.publish(EVENT, core.control_rooms.status(now))
 
     def _count_failures(self) -> None:
-        """Count what a policy got wrong, and tell of the first time."""
+        """Count a policy's failures, and report the first one."""
         failures = self.core.counters["policy failed"]
         counted = self._policy_failures
         if failures > counted:

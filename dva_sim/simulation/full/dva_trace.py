@@ -111,7 +111,7 @@ class TracedDva:
         return self._decided({"do": "go on"}, self._core.go_on)
 
     def dismiss(self, device: str, now: float) -> list[Send]:
-        """Dismiss somebody."""
+        """Dismiss a device."""
         values = {"do": "dismiss", "device": device, "now": now}
         return self._decided(values, lambda: self._core.dismiss(device, now))
 
@@ -147,7 +147,7 @@ class TracedDva:
         return decision
 
     def _new_roles(self) -> dict[str, Any]:
-        """Return the roles of control rooms, if somebody was appointed since the last line."""
+        """Return the roles of control rooms if one has changed since the last line."""
         roles = self._core.roles.known
         if roles == self._roles:
             return {}
@@ -156,7 +156,7 @@ class TracedDva:
 
 
 def _nowhere(_: str) -> None:
-    """Take what is kept no longer."""
+    """Forget devices and events that are no longer kept."""
 
 
 def traced(core: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
@@ -173,7 +173,7 @@ def _parts(decision: Any) -> tuple[m.Reply | None, list[Send]]:
 
 
 def _in_words(decision: Any) -> list[str]:
-    """Return the reply, if there is one, and what else is sent."""
+    """Return the reply, if there is one, and the other messages."""
     reply, sends = _parts(decision)
     return [*([] if reply is None else [repr(reply)]), *map(repr, sends)]
 
@@ -182,7 +182,7 @@ def _in_words(decision: Any) -> list[str]:
 
 
 class Decided(NamedTuple):
-    """One line of a trace: what happened, what was decided then, and what is decided now."""
+    """Line of a trace: an input, the decision then, and the decision now."""
 
     line: int
     what: str
@@ -240,7 +240,7 @@ class _Again:
         return self._bits.popleft() if self._bits else 0
 
     def decide(self, entry: dict[str, Any]) -> list[str]:
-        """Let it happen once more; what is decided now."""
+        """Apply the input again; return the decision now."""
         self._bits = deque(entry.get("bits", ()))
         if "roles" in entry:
             roles = {room: ControlRoomRole(role) for room, role in entry["roles"].items()}

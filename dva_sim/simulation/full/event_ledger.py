@@ -176,7 +176,7 @@ class EventLedger:
     # --- messages ------------------------------------------------------------------------
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
-        """Note what has reached the DVA; `source` has really sent it."""
+        """Note a message that has reached the DVA; `source` is its true sender."""
         if message is None or message.source != source:
             return
         self.is_heard(source, now)
@@ -389,7 +389,7 @@ class EventLedger:
                 yield from self._of_event(event, old, now, last)
 
     def _forget_unpromised(self, events: EventTable) -> None:
-        """Forget events of which nobody was told that they are known, if a restart has lost them.
+        """Drop events lost by a restart that were never confirmed to anybody.
 
         Another event may have the number of such a one.
         """
@@ -411,7 +411,7 @@ class EventLedger:
             new.went |= word.went
 
     def _listed(self, report: m.EventReport) -> Iterator[Broken]:
-        """Yield what the DVA has not noted of a report that it has taken."""
+        """Yield the differences between an accepted report and the DVA's table."""
         fitting = [*self._fitting(report)]
         if not fitting:
             yield "S6", f"a {report.kind} was reported, but the DVA does not list it"

@@ -168,7 +168,7 @@ def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
 
 
 class RunHazards:
-    """Hazards at the site: what is there and visible, and what has been dealt with.
+    """Hazards at the site: active, visible and contained ones.
 
     Attributes:
         incidents: Incidents of the scenario, in its order.
@@ -196,7 +196,7 @@ class RunHazards:
         return [incident.spot(now) for incident in self._going_on(now)]
 
     def contain(self, kind: str, x: float, y: float) -> None:
-        """Deal with what is at a place [m]: from now on it harms nobody."""
+        """Contain the hazard at a place [m]: from now on it harms nobody."""
         now = self.stage.clock.now
         for number, incident in enumerate(self.incidents):
             near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE

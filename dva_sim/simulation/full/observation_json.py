@@ -31,7 +31,7 @@ class _Form(NamedTuple):
 
 
 def _as_named(kind: type, **renamed: str) -> _Form:
-    """Return the form of a kind whose fields fit JSON as they are, some under other names."""
+    """Return the form of a kind whose fields JSON can hold directly, some under other names."""
     fields = [name for name in kind._fields if name != "time"]  # type: ignore[attr-defined]
     names = {name: renamed.get(name, name) for name in fields}
 

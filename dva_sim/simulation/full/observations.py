@@ -168,7 +168,7 @@ class Right(NamedTuple):
 
 
 class Page(NamedTuple):
-    """The DVA's book as it is now.
+    """Current table of the DVA.
 
     Attributes:
         events: The events.
@@ -215,7 +215,7 @@ class Observer(Listener, Protocol):
         """Take a command to drive that a robot has accepted."""
 
     def by_hand(self, done: ByHand) -> None:
-        """Take an action by hand, at the robot itself, of which no message tells."""
+        """Take an action of manual control at the robot itself, which no message reports."""
 
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
         """Take the motion of robots, by id."""
@@ -234,11 +234,11 @@ MAX_SENT = 50_000  # maximum messages whose sender is remembered
 
 
 class Senders:
-    """Finds the true sender of a message over sockets, where only the message names one.
+    """True senders of messages over sockets, where only the message names one.
 
     Args:
         is_ours: Predicate for devices whose every message is noted.
-        most: So many messages are remembered; None: all.
+        most: Maximum number of remembered messages; None: all.
     """
 
     def __init__(self, is_ours: Callable[[str], bool], most: int | None = MAX_SENT) -> None:
@@ -285,7 +285,7 @@ class Heard(NamedTuple):
 
 
 class MotionNews(NamedTuple):
-    """Motion of the robots that move otherwise than before, by id."""
+    """Motion of the robots whose motion has changed, by id."""
 
     time: float
     motions: dict[str, RobotMotion]
@@ -335,7 +335,7 @@ class Deafened(NamedTuple):
 
 
 class Slowed(NamedTuple):
-    """From now on a message takes a robot's computer so long on average [s]."""
+    """Mean processing time of a message by a robot's computer from now on [s]."""
 
     time: float
     processing: float
@@ -440,7 +440,7 @@ class FactLog:
         self._put(done)
 
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
-        """See `Observer`: that somebody has looked is a fact, too."""
+        """Implement `Observer`: the check itself is a fact, too."""
         self._note_motions(now, motions, at_all=True)
 
     def _note_motions(

@@ -139,7 +139,7 @@ class Playback:
 
     @property
     def people_decide(self) -> bool:
-        """True if somebody takes part at a control room."""
+        """True if a person takes part at a control room."""
         person = self.scenario.dispatch.person is not None
         return person or any(fact.role is not None for fact in self.facts)
 

@@ -44,7 +44,7 @@ class RegionalDvaAgent(DvaAgent):
         self._told: m.PeerStatus | None = None
 
     def start(self) -> None:
-        """Begin as any DVA, and make oneself known to the others."""
+        """Begin like any DVA, and register with the others."""
         super().start()
         clock = self.device.clock
         for peer in self._peers:

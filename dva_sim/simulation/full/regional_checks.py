@@ -98,7 +98,7 @@ class RegionalRules:
     # --- messages --------------------------------------------------------------------------
 
     def delivered(self, now: float, source: str, to: str, payload: bytes) -> None:
-        """Take a message that has reached somebody."""
+        """Take a message that has arrived."""
         if not any(mark in payload for mark in _MARKS) and source not in self.terms.dvas:
             return
         message = decode_if_valid(payload)
@@ -126,7 +126,7 @@ class RegionalRules:
                 table.popitem(last=False)
 
     def sent(self, now: float, source: str, to: str, payload: bytes) -> Iterator[Broken]:
-        """Take a message that somebody has sent; yield the rules that it breaks."""
+        """Take a message that was sent; yield the rules that it breaks."""
         if source in self.terms.dvas:
             self._said(now, source, to, payload)
         elif to in self.terms.dvas and b"<reply>" in payload and self._ordered:
@@ -291,7 +291,7 @@ class RegionalRules:
     def _lasting(
         self, rule: str, dva: str, conditions: set[tuple[Any, ...]], now: float
     ) -> Iterator[tuple[tuple[Any, ...], float]]:
-        """Yield what was found at every page so far, and since when [s]."""
+        """Yield the findings at every table so far, and when each began [s]."""
         for key in [key for key in self._since if key[:2] == (rule, dva)]:
             if key[2:] not in conditions:
                 del self._since[key]

@@ -303,7 +303,7 @@ class Witness:
         self.latched = True
 
     def reports_emergency(self, message: m.Message, now: float, rule: m.ReleasedBy | None) -> None:
-        """Note what it says of its emergency: a tick that is new means that it has obeyed one."""
+        """Note its report of an emergency: a new tick means that it has obeyed one."""
         body = message.body
         if not isinstance(body, m.RobotEmergency):
             return
@@ -370,7 +370,7 @@ class Witness:
 
 
 class SafetyAudit:
-    """Holds what happens against the rules, and tells the recorder what breaks one.
+    """Audit that checks the facts of a run against the rules, and records breaches.
 
     It is an `Observer`.
 
@@ -415,7 +415,7 @@ class SafetyAudit:
         return self._labels.get(device, device)
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
-        """See `Observer`: a robot that hangs hears nothing, forgets what waits, and is idle."""
+        """Implement `Observer`: a robot that hangs is idle, hears nothing and loses its queue."""
         (self._deaf.add if deaf else self._deaf.discard)(robot)
         witness = self.witness(robot)
         witness.does = None
@@ -648,7 +648,7 @@ class SafetyAudit:
         request: Unanswered,
         now: float,
     ) -> Iterator[Broken]:
-        """Note that a robot has begun to do what somebody asked for."""
+        """Note that a robot has begun to carry out an order."""
         message = request.message
         level = "teleoperation" if isinstance(message.body, m.StartTeleOp) else "missions"
         broken = witness.permits(message.source, message.session, level, now)
@@ -846,7 +846,7 @@ def _learn_from_status(witness: Witness, status: m.Message | None, now: float) -
 
 
 def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[Broken]:
-    """Yield a permission that the DVA confirms to a robot otherwise than it gave it."""
+    """Yield a permission that the DVA confirms to a robot in another form than it gave it."""
     if not isinstance(content, m.Permission):
         return
     right = Held(content.device, content.level, content.sensors)

@@ -222,7 +222,7 @@ class Stage:
 
     @property
     def follows_severity(self) -> bool:
-        """True if the severity of events rises with what is learnt of them."""
+        """True if the severity of events rises with further reports."""
         configured = self.scenario.dva.severity
         return self.attended if configured is None else configured == "followed"
 
@@ -236,7 +236,7 @@ class Stage:
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """Return a robot's limits, as taught to its operator; for unknown robots, those of ours."""
+        """Return a robot's limits as its operator knows them; by default those of our robots."""
         spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
@@ -322,7 +322,7 @@ class Stage:
 
 @lru_cache(maxsize=4)
 def planner_of(site: Site, radius: float) -> Planner:
-    """Return ways through a site for what has a radius [m]; the same site is planned for once."""
+    """Return a planner for bodies of a radius [m] on a site; the same one for the same site."""
     return Planner(site, radius)
 
 

@@ -1,4 +1,4 @@
-"""A robot in the hands of somebody outside of the run, who lets virtual time pass in steps."""
+"""Robot driven from outside the run, in steps of virtual time."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class SteppedDrive:
         return self.frame
 
     def step(self, speed: float, turn: float, dt: float) -> Outcome:
-        """Ask for a speed and a turn rate, as shares of the limits, for so long [s].
+        """Request a speed and a turn rate, as shares of the limits, for a time [s].
 
         Returns:
             `arrived` once the event is near in the picture; `lost` if the drive is over otherwise.

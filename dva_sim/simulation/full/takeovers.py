@@ -1,4 +1,4 @@
-"""Robots that a supervisor takes from their holders, by what is said on the network."""
+"""Robots that a supervisor takes from their holders, from messages on the network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_KEPT = 1000  # maximum requests that wait for an answer
 
 
 class Stopping(NamedTuple):
-    """A robot that is stopped for somebody.
+    """Robot that is stopped for its next holder.
 
     Attributes:
         asker: For whom.
@@ -27,7 +27,7 @@ class Stopping(NamedTuple):
 
 
 class Takeovers:
-    """Notes which robots are stopped for whom, and when they are given to them."""
+    """Ledger of robots that are stopped for a device, and of when they are handed over."""
 
     def __init__(self) -> None:
         self._asked: dict[tuple[str, int], str] = {}
@@ -44,11 +44,11 @@ class Takeovers:
 
     @property
     def waits(self) -> bool:
-        """True while somebody waits for an answer of the DVA."""
+        """True while a request of the DVA is unanswered."""
         return bool(self._asked)
 
     def says(self, to: str, reply: m.Reply, now: float) -> None:
-        """Note an answer of the DVA: a robot that is not free is stopped for who may take it."""
+        """Note an answer of the DVA: a held robot is stopped for a device that may take it."""
         robot = self._asked.pop((to, reply.answers), None)
         hold = self._held.get(robot or "")
         if robot is None or hold is None or hold.holder == to or reply.code != m.BUSY:

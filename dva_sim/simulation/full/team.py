@@ -297,7 +297,7 @@ class TeamBuilder:
         return places[number - 1] if distance is None else self._away(f"{kind}-{number}", distance)
 
     def _away(self, label: str, length: float) -> Pose:
-        """Return a place so far [m] from the event, looking along the way there."""
+        """Return a pose at a distance [m] from the event, facing along the path there."""
         site = self._stage.site
         rng = self._stage.streams.fresh(f"{label}/start")
         goal = self._hazards.incidents[0].hazard.position
@@ -356,7 +356,7 @@ class Power:
 
 
 def _cut(path: NDArray[np.float64], left: float) -> Pose | None:
-    """Return the pose with so much of a path `(n, 2)` left [m]; None if it is shorter."""
+    """Return the pose at a distance [m] before the end of a path `(n, 2)`; None if too short."""
     steps = np.hypot(*np.diff(path, axis=0).T)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     at = float(gone[-1]) - left

@@ -1,4 +1,4 @@
-"""Verdicts on the safety rules: each was held, broken by somebody, or not judged.
+"""Verdicts on the safety rules: each was kept, broken by a device, or not judged.
 
 A `Judge` takes the facts of a live run or of a recording, and lets the audit compare them with the
 rules. It runs nothing of the program that was recorded.

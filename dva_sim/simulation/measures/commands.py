@@ -79,7 +79,7 @@ def ratio(amount: float, of: float) -> float:
 
 
 def restricted_mean(values: Iterable[float], horizon: float) -> float:
-    """Mean of durations [s] in which the horizon stands for what never came (nan); nan of none."""
+    """Return the mean of durations [s], with the horizon in place of NaN; NaN without any."""
     return mean([horizon if math.isnan(value) else value for value in values])
 
 

@@ -112,7 +112,7 @@ def command_ages(drives: Sequence[Driven]) -> Row:
 
 
 def delay_budget(drives: Sequence[Driven], motor: float) -> Row:
-    """Return the mean of each stage, their sum, and the whole as it was measured.
+    """Return the mean of each stage, their sum, and the measured total.
 
     Nothing (nan) where no command rests on a picture: nobody tilts, or the filter is frozen.
 

@@ -244,7 +244,7 @@ def _columns(recording: TimedRecording, raw: Columns, bounds: Floats, follow: fl
 
 
 def _open_ones(raw: Columns) -> NDArray[np.intp]:
-    """Return the code of each outcome; of what was not closed, that of `open`."""
+    """Return the code of each outcome; `open` for events that were not closed."""
     return np.where(np.isfinite(raw["closed"]), raw["outcome"], len(OUTCOMES)).astype(np.intp)
 
 

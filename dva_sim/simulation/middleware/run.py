@@ -66,7 +66,7 @@ class MiddlewareRun(NamedTuple):
 
 
 def lacks(scenario: MiddlewareScenario) -> str:
-    """Return one line that says what the transport or the link needs here; empty if nothing."""
+    """Return, in one line, what the transport or the link lacks here; empty if nothing."""
     choice = scenario.transport
     return load_transport(choice.name, choice.options)().lacks() or _why_no_link()
 

@@ -114,14 +114,14 @@ Kinds = Kind | dict[Annotated[int, BeforeValidator(_number), Field(ge=1)], Kind]
 
 
 def persons_of(kinds: Kinds, count: int) -> tuple[int, ...]:
-    """Return the numbers of those who are persons."""
+    """Return the numbers of the operators who are persons."""
     if isinstance(kinds, str):
         return tuple(range(1, count + 1)) if kinds == "person" else ()
     return tuple(sorted(number for number, kind in kinds.items() if kind == "person"))
 
 
 def check_kinds(kinds: Kinds, count: int, what: str) -> None:
-    """Refuse numbers of those who are not there.
+    """Refuse numbers of operators that do not exist.
 
     Raises:
         ValueError: there are some.

@@ -143,7 +143,7 @@ class Scenario(WithTable):
 
 
 def pattern_of(scenario: Scenario) -> Pattern:
-    """Return the messaging pattern of a scenario, to be asked what it is.
+    """Return the messaging pattern of a scenario, for its attributes.
 
     Raises:
         ConfigError: there is no such pattern, or it does not know its options.

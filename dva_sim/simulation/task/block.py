@@ -1,4 +1,4 @@
-"""A block of trials: one person does what a scenario asks for, trial after trial."""
+"""Block of trials: one person does the task of a scenario, trial after trial."""
 
 from __future__ import annotations
 
@@ -157,10 +157,10 @@ def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, T
 
 
 def rehearse(scenario: TaskScenario) -> None:
-    """Make the first trial, and let no time pass in it.
+    """Make the first trial without letting time pass.
 
     Raises:
-        ConfigError: who does it, or with what, cannot be made.
+        ConfigError: the person or the device cannot be made.
     """
     first = next(iter(scenario.task.conditions()))
     _trial(scenario, seat_of(scenario), first, 0, Streams(0))
@@ -278,7 +278,7 @@ def _goal(
 def _row(
     trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, number: int
 ) -> Row:
-    """Return the measures of a trial, with what tells it from the others."""
+    """Return the measures of a trial, with its number and conditions."""
     goal = trial.row() if isinstance(trial, DriveTrial) else trial.goal.row(trial)
     names = NAMES[trial.scenario.task.kind]
     return {

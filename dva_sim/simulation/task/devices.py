@@ -73,7 +73,7 @@ class HandDevice(ABC):
 
     @abstractmethod
     def reading(self) -> Pair:
-        """Return what the device sends now."""
+        """Return the current reading of the device."""
 
     def farthest(self) -> dict[str, float]:
         """Return the greatest distance of the hand from rest, as a column; nothing without rest."""

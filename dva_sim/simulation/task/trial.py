@@ -52,7 +52,7 @@ class Seat:
     timing: Timing | None = None
 
     def judged_delay(self, now: float) -> float:
-        """Return the delay as it is judged at a moment [s]: what is new of it is misjudged."""
+        """Return the judged delay at a moment [s]; recent changes of it are misjudged."""
         value = self.delay.value
         usual = self.person.usual_delay
         return value if self.timing is None else self.timing.judged(value, usual, now)
@@ -132,7 +132,7 @@ class WayKept:
         return inside
 
     def row(self, seconds: float) -> dict[str, float]:
-        """Return what is measured, over so long a time [s]."""
+        """Return the measures over a time [s]."""
         return {
             "error": float(self.crossings > 0),
             "wall_crossings": self.crossings,
@@ -194,7 +194,7 @@ class Trial(ABC, Generic[S]):
 
     @abstractmethod
     def sight(self) -> S:
-        """Return what a frame taken now shows."""
+        """Return the content of a frame taken now."""
 
     @abstractmethod
     def decide(self, driver: Driver, frame: S, now: float) -> None:
@@ -202,7 +202,7 @@ class Trial(ABC, Generic[S]):
 
     @abstractmethod
     def advance(self, dt: float) -> None:
-        """Let `dt` [s] pass for hand, link and what is moved."""
+        """Advance hand, link and the moved object by `dt` [s]."""
 
     def run(self, keep: bool = False) -> None:
         """Play the trial to its end; `keep` its trace to be drawn."""

@@ -245,7 +245,7 @@ def make_core(shift: Team, policy: Policy) -> Dva:
 
 
 def register(shift: Team) -> None:
-    """Register everybody; who is on duty later shows no place until then."""
+    """Register all devices; those on duty later report no position until then."""
     mail = shift.mail
     scenario = shift.scenario
 

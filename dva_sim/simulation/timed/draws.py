@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Draws(Generic[T]):
-    """Draws number 0, 1, 2, ... for one purpose.
+    """Random draws for one purpose, by index from 0.
 
     Args:
         streams: Random streams of the run.

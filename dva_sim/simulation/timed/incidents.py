@@ -17,8 +17,8 @@ class Incident:
 
     Attributes:
         stream: Number of its stream.
-        index: Its place in the stream.
-        number: Its place among all incidents of the run.
+        index: Index in the stream.
+        number: Index among all incidents of the run.
         kind: `fire`, `gas_leak` or `flood`.
         true: True for a real event, false for a false alarm.
         severity: Reported severity, 0 to 1.
@@ -59,7 +59,7 @@ class Incident:
         return self._hazard.danger_radius(now)
 
     def report(self, finding: str) -> m.EventReport:
-        """Return the report of somebody who was not sent."""
+        """Return the report of a device that was not sent."""
         return m.EventReport(
             None, self.kind, self.place.position, self.severity, self.confidence, finding
         )

@@ -74,7 +74,7 @@ class Mail:
         self.core.note(self._message(source, body), self._clock.now)
 
     def carry(self) -> None:
-        """Bring everything that was said, and what was said in answer, until all is quiet."""
+        """Deliver all messages and the answers to them, until none is left."""
         waiting = self._waiting
         core = self.core
         now = self._clock.now
@@ -103,7 +103,7 @@ class Mail:
         return m.Message(DVA, number, source, NOON, 0, body)
 
     def _deliver(self, sends: list[Send]) -> None:
-        """Hand over what the core wants delivered, and tell it how that went."""
+        """Deliver the core's messages, and report the outcome to it."""
         queue = deque(sends)
         now = self._clock.now
         if self._attentive and sends:

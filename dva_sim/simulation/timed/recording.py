@@ -346,7 +346,7 @@ class TimedRecording:
         return total / count if count else math.nan
 
     def waited(self, stream: int | None = None) -> float:
-        """Return the share of the events somebody was sent to that had to wait for it."""
+        """Return the share of attended events that had to wait for a responder."""
         count = self.total("wait", stream)[0]
         return float(self._of(self.cells, stream)[..., WAITED].sum()) / count if count else math.nan
 

@@ -62,10 +62,10 @@ class ShiftWorld(Protocol):
         """Note that a job is over, or broken off."""
 
     def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
-        """Note that a guard has been within a danger radius for so long."""
+        """Note the time of a guard within a danger radius."""
 
     def moving(self, unit: Unit, moves: bool) -> None:
-        """Note that a unit begins or ceases to move in a way that the DVA should be told of."""
+        """Note that a unit begins or ceases to move, which is reported to the DVA."""
 
 
 @dataclass(slots=True)

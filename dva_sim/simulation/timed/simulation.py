@@ -266,7 +266,7 @@ class Shift:
             self._settle(about, "refused", self.clock.now)
 
     def _match(self, about: object, event: Event, now: float) -> None:
-        """Find out what the DVA took a report for."""
+        """Find the event to which the DVA assigned a report."""
         if event.number > self._newest:
             self._newest = event.number
             assert isinstance(about, Incident)
@@ -281,7 +281,7 @@ class Shift:
                 self._reported(about, event)
 
     def _reported(self, incident: Incident, event: Event) -> None:
-        """Note as what the DVA knows an incident."""
+        """Note the DVA's event of an incident."""
         incident.event = event
         self.reports[event.number] = event.reports
         del self.unnoticed[incident.number]
@@ -331,7 +331,7 @@ class Shift:
     # --- what units may ask, and tell: see `responders.ShiftWorld` ---------------------------
 
     def after(self, delay: float, action: Any, *args: Any) -> None:
-        """Do something later [s]; what it says is heard when it is done."""
+        """Run an action later [s]; its messages are delivered after it."""
         self.clock.call_after(delay, self._do, action, args)
 
     def _do(self, action: Any, args: tuple[Any, ...]) -> None:
@@ -432,7 +432,7 @@ class Shift:
         return max(0.0, min(self.clock.now, self.slices.end) - max(since, self.slices.start))
 
     def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
-        """Note that a guard has been within a danger radius for so long."""
+        """Note the time of a guard within a danger radius."""
         if seconds > 0.0 and self.slices.of(self.clock.now) is not None:
             self.records[unit.number].exposure[stage] += seconds
 

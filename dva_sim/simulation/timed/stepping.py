@@ -130,7 +130,7 @@ class _Closed(BaseException):
 
 
 class _Outside(Policy):
-    """The policy of somebody outside of the run."""
+    """Policy that is decided outside of the run."""
 
     def __init__(self, ask: Callable[[Situation, np.random.Generator], Sequence[Advice]]) -> None:
         self._ask = ask

@@ -1,8 +1,8 @@
-"""Ways in a shift: between places without a map, on a plane, or planned on a site.
+"""Travel in a shift: between places without a map, on a plane, or planned on a site.
 
-On a site there are a few places in each room. Ways between places that stay are planned once per
-process. From half-way, where planning each time would cost more than the rest of the run, the way
-leads straight to what is in sight - the goal, a door or an opening - and on from there.
+On a site there are a few places in each room. Paths between fixed places are planned once per
+process. From a point under way, where planning would cost more than the rest of the run, the path
+leads straight to a visible goal, door or opening, and on from there.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ class Terrain:
         return None
 
     def spots(self, zone: int) -> list[Place]:
-        """Return places that a zone is known by: what is far from them is far from the zone."""
+        """Return places that represent a zone: a place far from them is far from the zone."""
         return [self.centre(zone)]
 
     def origin(self) -> Place:
@@ -191,7 +191,7 @@ class Terrain:
         return 0.0
 
     def along(self, a: Place, b: Place, gone: float) -> Place:
-        """Return the place after so much of the path [m] from `a` to `b`."""
+        """Return the place at a distance along the path from `a` to `b` [m]."""
         return b
 
 
@@ -312,7 +312,7 @@ class _Ways:
         return length
 
     def path(self, a: Point, b: Point) -> Floats | None:
-        """Return the way itself: who is under way is asked again and again where it is."""
+        """Return the path itself, since positions under way are queried repeatedly."""
         if (a, b) not in self._paths:
             if len(self._paths) >= MAX_PATHS:
                 self._paths.clear()

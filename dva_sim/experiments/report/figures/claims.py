@@ -1,4 +1,4 @@
-"""Registered hypotheses: what was found, with its interval, beside what was claimed."""
+"""Figure of registered hypotheses: results with their intervals, and the claims."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _mark(ax: Axes, row: int, claim: Tested) -> None:
 
 
 def _claimed(ax: Axes, row: int, claim: Tested) -> None:
-    """Shade what was claimed, from the margin to the edge of the axes."""
+    """Shade the claim, from the margin to the edge of the axes."""
     margin = claim.hypothesis.margin
     left, right = ax.get_xlim()
     low, high = {

@@ -1,4 +1,4 @@
-"""Figures of commands: their age when they take effect, and what each transport brings."""
+"""Figures of commands: their age when they take effect, and the gain of each transport."""
 
 from __future__ import annotations
 

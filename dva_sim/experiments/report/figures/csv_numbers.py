@@ -1,4 +1,4 @@
-"""The numbers behind a figure, written down as they are drawn, to be kept beside it as CSV."""
+"""Numbers of a figure, noted as they are drawn, for a CSV file beside it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Numbers:
         self._rows.append(dict(where) | columns)
 
     def csv(self) -> bytes:
-        """Return the comma-separated, with a heading; what is missing is left empty."""
+        """Return comma-separated text with a heading; missing values are empty."""
         heads = list(dict.fromkeys(key for row in self._rows for key in row))
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")

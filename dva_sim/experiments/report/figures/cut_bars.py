@@ -1,4 +1,4 @@
-"""Bars that go beyond the axes: the axes fit what persons did, and the edge tells what is cut."""
+"""Bars beyond the axes: the axes fit the persons' values, and marks show the cut bars."""
 
 from __future__ import annotations
 

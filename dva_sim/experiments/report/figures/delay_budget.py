@@ -181,7 +181,7 @@ class Stacks:
             yield ax, panel, level
 
     def close(self) -> None:
-        """Label the panels; to be called last, since it ends the fitting to what is drawn."""
+        """Label the panels; to be called last, since it fixes the axes."""
         view = self._view
         columns = self._columns
         count = len(self._view.series)
@@ -198,7 +198,7 @@ class Stacks:
 
 
 def stack(ax: Axes, parts: Mapping[str, Floats], fills: Mapping[str, Fill]) -> None:
-    """Stack parts `(stops,)` on end; those that are zero everywhere take no place."""
+    """Stack parts `(stops,)`, without those that are zero everywhere."""
     floor: Floats = np.zeros(len(next(iter(parts.values()))))
     for name, values in parts.items():
         top = floor + np.nan_to_num(values)

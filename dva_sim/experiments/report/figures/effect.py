@@ -132,7 +132,7 @@ def _curves(
 
 
 def _possible(bands: Band, least: float, most: float) -> Band:
-    """Return its limits within what is possible."""
+    """Return the limits within the possible range of the measure."""
     edges = ("low", "high", "pointwise_low", "pointwise_high")
     return replace(bands, **{edge: np.clip(getattr(bands, edge), least, most) for edge in edges})
 

@@ -1,4 +1,4 @@
-"""The effect over two factors at once: where it turns round, and where that can be told."""
+"""Effect over two factors: where its sign changes, and where the sign is certain."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
 
 
 def _contours(ax: Axes, field: EffectField) -> bool:
-    """Return the line of no effect with those of the band's edges; whether there is one."""
+    """Draw the contours of no effect and of the band's edges; return True if there are any."""
     has_zero = False
     for values, dashes, width in (
         (field.mean, "-", 2.2),

@@ -74,7 +74,7 @@ def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None
 
 
 def box(fill: Fill) -> Artist:
-    """Return a handle for what a surface stands for."""
+    """Return a handle for the meaning of a surface."""
     from matplotlib.patches import Patch
 
     return Patch(facecolor=fill.colour, hatch=fill.hatch, edgecolor=PAPER, lw=0.5)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _PANELS_A_ROW = 3
-_BINS = 8  # of equally many points, through whose means the trend is drawn
+_BINS = 8  # number of bins with equally many points, through whose means the trend is drawn
 _MIN_IN_BIN = 6
 
 

@@ -120,7 +120,7 @@ def _half_widths(shifts: Shifts, column: str) -> Any:
 
 
 def _frontier(ax: Axes, x: Any, y: Any) -> None:
-    """Draw a line through those that no other beats on both."""
+    """Draw a line through the policies that no other beats in both measures."""
     best = [
         i
         for i in range(len(x))

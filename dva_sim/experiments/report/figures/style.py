@@ -1,4 +1,4 @@
-"""One look for all figures, and what each is: `ReportFigure`, drawn on quiet axes as stable bytes.
+"""Common style of all figures, and their base class `ReportFigure`; drawn as stable bytes.
 
 The numbers behind a figure are written down as they are drawn, to be kept beside it as CSV.
 """
@@ -223,7 +223,7 @@ def level_axis(axes: Axes, factor: Factor, width: int = _ROW_LABEL) -> None:
 
 
 def _factor_label(factor: Factor, unit: str) -> str:
-    """Return the label with its unit, and whether levels are as far apart as their places."""
+    """Return the label with its unit, and True if levels are spaced by their values."""
     scale = "" if is_to_scale(factor) else ", not to scale"
     return f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}{scale}"
 
@@ -293,7 +293,7 @@ def panel_grid(view: StudyView, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def label_panels(axes: Sequence[Axes], view: StudyView, text: str) -> None:
-    """Label a grid of panels; what is common to them stands on its outer edges only."""
+    """Label a grid of panels, with common labels only on its outer edges."""
     columns = 2 if len(axes) == 4 else len(axes)
     for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
         panel_title(ax, panel, _TITLE // columns)

@@ -126,7 +126,7 @@ def _scaled(places: Sequence[tuple[float, float]], unit: LengthUnit) -> list[lis
 
 
 def _bodies(ax: Axes, trace: Trace, radius: float) -> None:
-    """Draw the vehicle's body, as wide as it is, every few widths of the way [m]."""
+    """Draw the vehicle's body in its true width, every few widths along the path [m]."""
     from matplotlib.patches import Circle
 
     last = None
@@ -137,7 +137,7 @@ def _bodies(ax: Axes, trace: Trace, radius: float) -> None:
 
 
 def _numbers(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
-    """Write in which order the places are gone to, beside them, away from the others."""
+    """Write the order of the places beside them, away from the other labels."""
     middle = float(np.mean([x for x, _, _ in trace.marks]))
     for number, (x, y, radius) in enumerate(trace.marks, 1):
         side = -1.0 if x < middle else 1.0
