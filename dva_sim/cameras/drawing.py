@@ -59,7 +59,7 @@ class Eyes:
         self.rate = run.camera.rate_hz
 
     def contain(self, number: int, time: float) -> None:
-        """Note that an incident, by its place among all, was dealt with at `time` [s]."""
+        """Note that the incident with this index was contained at `time` [s]."""
         if number in self._contained:
             return
         self._contained[number] = time
@@ -103,7 +103,7 @@ class Eyes:
 
 
 def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
-    """Return the figure of somebody who was near."""
+    """Return the figure of a person or robot near the camera."""
     return Figure(kind, x, y, heading, number=index, lying=activity == INCAPACITATED)
 
 

@@ -1,4 +1,4 @@
-"""Draws the camera pictures that somebody watches, in a process or a thread of its own.
+"""Draws the camera pictures that are watched, in a process or a thread of its own.
 
 It hears from the run which frames arrived, and from the server of the pictures which robots are
 watched; of each watched robot it draws the newest frame, in turn. Nobody waits for it, and it waits
@@ -26,7 +26,7 @@ Line = dict[str, Any]
 
 
 class Painter:
-    """Draws what is watched, the newest first.
+    """Draws the newest frame of each watched camera.
 
     Attributes:
         drawn: Pictures that were drawn.

@@ -1,4 +1,4 @@
-"""Frames that somebody looks at: noted when they are taken, told when they have arrived.
+"""Watched frames: noted when they are taken, passed on when they have arrived.
 
 They come over the modelled link, to the seat that holds the robot, or else to a screen of the
 console. The data of a frame are those of the time when it was taken.
@@ -173,7 +173,7 @@ class OwnScreens(Screens):
         """Subscribe to nothing: nobody has to be asked for the pictures."""
 
     def look(self) -> None:
-        """Take a picture with each camera that somebody looks at and that works."""
+        """Take a picture with each camera that is watched and works."""
         now = self._run.clock.now
         for id_tag in self._watched:
             robot = self._run.field.robots[id_tag]

@@ -92,7 +92,7 @@ class CameraService:
         self._clock.every(FLUSH, lambda: self._flush(child))
 
     def _greet(self, child: PipedChild) -> None:
-        """Send what the process has to know before the first picture."""
+        """Send the scene, which the process needs before the first picture."""
         assert self._run is not None
         scenario = self._run.scenario.model_dump(mode="json")
         child.pipe.put(scene_line(scenario, self._seed))
@@ -157,7 +157,7 @@ class CameraService:
 
 
 class PictureService(CameraService):
-    """Serves the pictures that a real camera has taken, as they are."""
+    """Serves the pictures of a real camera, unchanged."""
 
     def serve(self, label: str) -> None:
         """Serve the camera of one robot from now on."""
@@ -191,7 +191,7 @@ class PictureService(CameraService):
 
 
 class _Numbers(dict[str, int]):
-    """Numbers of everybody who may be in a picture, given as they come."""
+    """Numbers of the people and robots in pictures, assigned at first use."""
 
     def __missing__(self, name: str) -> int:
         self[name] = number = len(self)

@@ -1,7 +1,7 @@
-"""The words on the command line: what to run, where to write, and what a terminal shows.
+"""The command line: its commands and options, and the output on a terminal.
 
-It may import every room. A command takes what the function of its name in `api` takes, which is
-made options of in `options`. Modules of commands import little when they are loaded, so that help
+It may import every room. A command takes the arguments of the function of its name in `api`, which
+`options` turns into options. Modules of commands import little when they are loaded, so that help
 is quick. Begin reading at `program`, then at one module of commands, such as `studies`.
 """
 

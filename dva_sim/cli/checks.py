@@ -86,7 +86,7 @@ def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> Exi
 
 
 def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -> ExitCode:
-    """Try something and say what came of it."""
+    """Try a plug-in and print the outcome."""
     try:
         outcome = tried(trial.load_check(), name, options)
     except ConfigError as error:
@@ -112,7 +112,7 @@ def _sum_up(one: str, many: str, codes: Sequence[ExitCode]) -> ExitCode:
 
 
 def print_schema(kind: str) -> None:
-    """Print a schema as it is, so that it can be written into a file."""
+    """Print a schema without wrapping, so that it can be redirected into a file."""
     sys.stdout.write(schema_text(kind))
 
 

@@ -48,7 +48,7 @@ class CommandWithExamples(TyperCommand):
         ]
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Write options, then what has to be given, and in brackets what may be."""
+        """Write options, then the required arguments, then the optional ones in brackets."""
         arguments = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
         names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in arguments]
         return ["[OPTIONS]", *names]
@@ -64,7 +64,7 @@ class CommandWithExamples(TyperCommand):
             formatter.write_dl([record for record in records if record is not None])
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """Write the examples as they are, since rewrapped ones cannot be copied."""
+        """Write the examples unwrapped, since wrapped ones cannot be copied."""
         super().format_epilog(ctx, formatter)
         if not self.examples:
             return

@@ -1,4 +1,4 @@
-"""`dva-sim compare`: what two results folders have otherwise, and what a gate makes of it."""
+"""`dva-sim compare`: the differences of two results folders, and the verdict of a gate."""
 
 from __future__ import annotations
 

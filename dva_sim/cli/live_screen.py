@@ -83,7 +83,7 @@ class Board:
         return sorted(report.story)
 
     def table(self) -> Table:
-        """Return the devices: what they are, do, and how the link to each is.
+        """Return the devices with their types, activities and links.
 
         Two lines for each, so that the columns fit 80 characters; a label or an address that is
         longer goes on below.
@@ -158,7 +158,7 @@ def _watched(
     door: OpenPort | None,
     viewer: FoxgloveServer | None,
 ) -> Summary:
-    """Run all parts before somebody's eyes."""
+    """Run all parts, and show them on a terminal as they run."""
     if not console.is_terminal:
         with closing(InOrder(console, board)) as ordered:
             return make(lambda _, report: ordered.hear(report), door, viewer).run()
@@ -200,7 +200,7 @@ def _console() -> Console:
 
 
 def run_one(part: str, options: LiveOptions) -> None:
-    """Run one part in this process and show what it knows.
+    """Run one part in this process and show its view of the run.
 
     Raises:
         DvaSimError: the scenario, the keys or the ports are not as they should be.

@@ -84,7 +84,7 @@ def _cell(value: object) -> object:
 
 
 def table(steps: list[LoadFigures]) -> str:
-    """Return the figures as CSV, a row for each step; empty cells for what is not known."""
+    """Return the figures as CSV, a row for each step, with empty cells for unknown figures."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow([field.name for field in fields(steps[0])])

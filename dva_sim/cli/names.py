@@ -162,7 +162,7 @@ def lines(kind: str | None = None) -> Iterator[str]:
 
 
 def tell(texts: Iterable[str]) -> None:
-    """Print lines that never wrap: on a terminal what has no room is cut, elsewhere nothing is."""
+    """Print lines without wrapping: cut to the width of a terminal, else whole."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in texts:
         print(line if width is None or len(line) <= width else f"{line[: width - 3].rstrip()}...")

@@ -61,7 +61,7 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _options_of(options: type) -> list[Parameter]:
-    """Return parameters for the options of a class, except those that only programs have."""
+    """Return parameters for the options of a class, except options only for programs."""
     forms = forms_of(options)
     return [
         _option(name, forms[name][0], form, parameter.default)

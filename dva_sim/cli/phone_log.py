@@ -1,4 +1,4 @@
-"""Prints what a file of a phone's motion tells, and writes an accelerometer part of it."""
+"""Prints the figures of a phone's motion file, and writes an accelerometer part from them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def lines(figures: MotionFigures) -> list[str]:
 
 
 def tell_commands(path: Path, rate_hz: float) -> None:
-    """Print what the apps of a file make of its samples, as a table with commas.
+    """Print the commands that the apps of a file make of its samples, separated by commas.
 
     Raises:
         ConfigError: it is no such file, or one of its apps cannot be made.
@@ -73,7 +73,7 @@ def tell_commands(path: Path, rate_hz: float) -> None:
 
 
 def write_part(path: Path, out: Path, unit: Unit | None) -> None:
-    """Write an accelerometer part of what a file tells.
+    """Write an accelerometer part from the figures of a motion file.
 
     Raises:
         ConfigError: it is no such file, or `out` exists or cannot be written.
@@ -93,6 +93,6 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
 
 
 def _yaml(value: object) -> str:
-    """Return a value as YAML has it: that of JSON is."""
+    """Return a value as YAML, of which JSON is a part."""
     assert not (isinstance(value, float) and not math.isfinite(value))
     return json.dumps(value)

@@ -24,7 +24,7 @@ from dva_sim.kernel.suggestions import either, hint
 
 
 def in_a_line(error: Any) -> str:
-    """Describe what is wrong with a call, and what would be right."""
+    """Describe the mistake in a call, and the correct form."""
     path = error.ctx.command_path if error.ctx is not None else "dva-sim"
     more = f"see {path} --help"
     kind = type(error).__name__
@@ -91,7 +91,7 @@ class Stopped(DvaSimError):
 
 
 class ReaderGone(DvaSimError):
-    """Nobody reads what a command prints."""
+    """The reader of a command's output, such as a pipe, has closed it."""
 
     exit_code = ExitCode.READER_GONE
 
@@ -181,7 +181,7 @@ app.callback()(_program)
 
 
 def call(words: Sequence[str] | None = None) -> int:
-    """Do what the words ask for; a mistake ends in one line on standard error.
+    """Run a command line; a mistake ends in one line on standard error.
 
     Args:
         words: Arguments of the command line, without the program's name; by default those of the
@@ -217,5 +217,5 @@ def _report(problem: object, code: int) -> int:
 
 
 def main() -> NoReturn:
-    """Do what the command line says, and end the process."""
+    """Run the command line of the process, and end the process."""
     sys.exit(call())

@@ -74,7 +74,7 @@ COLUMNS = {
 
 
 def tell_any(run: Played, console: Console) -> None:
-    """Tell of a run of whatever model: the measures of its row."""
+    """Print a run of any model: the measures of its row."""
     console.rule(f"{Path(run.scenario.model).name}, seed {run.seed}")
     print_lines(lines_of(run.tables["runs"][0], _columns(run)), console)
     console.print(f"simulated in {run.took_s:.2f} s", soft_wrap=True)
@@ -144,7 +144,7 @@ def _failed(row: Row) -> list[str]:
 
 
 def tell_full(run: Played, console: Console) -> None:
-    """Tell the story of a run of the full model, and what came of it."""
+    """Print the story of a run of the full model, and its outcome."""
     assert isinstance(run.kept, Recording)
     tell_story(run.kept, console)
     tell_outcome(run.tables, f"simulated in {run.took_s:.2f} s", console)
@@ -184,7 +184,7 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 
 
 def _unjudged(verdicts: Sequence[Verdict]) -> str:
-    """Say which safety rules could not be judged and why, and what is known of the others."""
+    """Describe the safety rules: not judged and why, broken, or held."""
     why: dict[str, list[str]] = {}
     for verdict in verdicts:
         if verdict.lacks_facts:
@@ -205,7 +205,7 @@ def _violations(count: int) -> str:
 
 # --- a shift -------------------------------------------------------------------------
 def tell_shift(run: Played, console: Console) -> None:
-    """Tell of a shift: its first events, and what it took to deal with all."""
+    """Print the first events of a shift, and the totals of all its events."""
     scenario = run.scenario
     recording = run.kept
     assert isinstance(scenario, TimedScenario)
@@ -278,7 +278,7 @@ def _seconds(value: float) -> str:
 
 # --- a session on a congested link ---------------------------------------------------
 def tell_session(run: Played, console: Console) -> None:
-    """Tell of a session on a congested link: each flow, and what the drive came to."""
+    """Print a session on a congested link: each flow, and the outcome of the drive."""
     scenario = run.scenario
     row = run.tables["runs"][0]
     assert isinstance(scenario, TransportScenario)
@@ -387,10 +387,10 @@ def _task_lines(row: Row) -> list[str]:
 
 
 def episode(request: EpisodeRequest, where: Console = console) -> None:
-    """Play what is asked for, tell it, and write its files.
+    """Play the requested runs, print them, and write their files.
 
     Raises:
-        ConfigError: it cannot be played, drawn or kept.
+        ConfigError: a run cannot be played, drawn or kept.
     """
     scenarios = request.scenarios()
     warn(doubts(scenarios), where)
@@ -411,10 +411,10 @@ def replay(
     mcap: Path | None = None,
     where: Console = console,
 ) -> None:
-    """Tell the story of a recording, and draw or export what is asked for.
+    """Print the story of a recording, and draw or export it as requested.
 
     Raises:
-        ConfigError: not a recording, or what is asked for is not in it.
+        ConfigError: not a recording, or a requested part is not in it.
         RulesNotJudged: facts are missing to judge it by all safety rules.
     """
     from dva_sim.live.recorded_lines import is_part, readable  # late: start-up

@@ -60,7 +60,7 @@ def run(options: RunOptions) -> ExitCode:
 
 
 def tune(options: TuneOptions) -> ExitCode:
-    """Choose what a study has tuned, and write it beside the study; the exit code."""
+    """Tune a study's setting, and write the result beside the study; return the exit code."""
     from dva_sim.experiments.trials import tune as try_all  # late: start-up
 
     study = open_study(options.study)
@@ -117,14 +117,14 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
 
 
 def plan(options: RunOptions) -> None:
-    """Say what `run` would do."""
+    """Print the runs that `run` would make, and their cost."""
     progress = _Shown(options, run_job)
     planned_study(options, progress)
     say(escape(_time(progress.preview)))
 
 
 class _Shown(StudyListener):
-    """Prints what happens to a study on its way.
+    """Prints the progress of a study.
 
     Args:
         options: Options that it is run with.
@@ -227,7 +227,7 @@ def _counted(number: int, one: str, many: str | None = None) -> str:
 
 
 def _stopped(how: KeyboardInterrupt) -> ExitCode:
-    """Say what was done, and the command that goes on."""
+    """Print that the study has stopped, and the command that resumes it."""
     say(f"Stopped: {how}" if str(how) else "Stopped.")
     say(f"To resume: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
     return ExitCode.INTERRUPTED

@@ -1,4 +1,4 @@
-"""`dva-sim validate`: what is played or measured, what a terminal shows of it, how it ends."""
+"""`dva-sim validate`: plays or measures, shows progress on a terminal, ends with a verdict."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _refuse_foreign(options: ValidateOptions) -> None:
 
 
 def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:
-    """Play, show the evidence, its state first, and write it if asked to; how it ended."""
+    """Play, show the verdict and the evidence, write them to `out` if given; the exit code."""
     started = time.perf_counter()
     result = play()
     say(f"[bold]{escape(result.headline)}[/bold]")
@@ -146,7 +146,7 @@ def _table(heads: Sequence[str], with_heads: bool) -> Table:
 
 
 def _bar() -> bars.Progress:
-    """Return a bar that says what is under way, how much of it is done, and for how long."""
+    """Return a progress bar with the current task, the finished share, and the elapsed time."""
     words = bars.TextColumn("{task.description}")
     done = bars.MofNCompleteColumn()
     return bars.Progress(words, bars.BarColumn(), done, bars.TimeElapsedColumn(), console=console)

@@ -39,7 +39,7 @@ def is_verbose() -> bool:
 
 
 def detail(line: str) -> None:
-    """Print a line if more than usual is wanted."""
+    """Print a line if `--verbose` is set."""
     if is_verbose():
         print(line)
 
@@ -67,13 +67,13 @@ WRITTEN = ("*.html", "*.pdf", "*.json", "figures/*", "tables/*")
 
 
 def tell_measures(row: Mapping[str, Any], columns: Iterable[Measure]) -> None:
-    """Tell every measure of a run, with its unit and what it means."""
+    """Print every measure of a run, with its unit and meaning."""
     if is_verbose():
         print("", *lines_of(row, columns), sep="\n")
 
 
 def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str]:
-    """Yield each value of a row in a line, with its unit and what it means."""
+    """Yield each value of a row in a line, with its unit and meaning."""
     from dva_sim.experiments.results.results import plain  # late: start-up
     from dva_sim.kernel.measure import Measure  # late: start-up
 

@@ -365,7 +365,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                     observations["bound_for"][index, bound] = 1.0
 
     def _reward(self) -> float:
-        """Return minus the minutes that events have waited since this was asked last."""
+        """Return minus the minutes that events have waited since the last call."""
         shift = self._running()
         since = self._since
         waited = 0.0

@@ -120,7 +120,7 @@ def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
         if isinstance(step, int):
             continue
         info = _fields(model).get(step)
-        if info is not None:  # else a key that the user chose, inside a mapping to models
+        if info is not None:  # None: the step is a key of the user's in a mapping to models
             is_item = isinstance(next(iter(path[number:]), None), int)
             model = (None if is_item else _keyed(info)) or model_in(info.annotation)
     return _fields(model)

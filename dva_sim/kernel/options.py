@@ -1,6 +1,6 @@
 """Options of plug-ins from a configuration, checked before anything runs.
 
-Each takes the name of an option and its value, returns the value, or says what would be right.
+Each function takes an option's name and value; it returns the value, or names the valid values.
 """
 
 from __future__ import annotations

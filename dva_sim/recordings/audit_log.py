@@ -49,7 +49,7 @@ COMMIT;
 
 
 class AuditWriteError(DvaSimError):
-    """A row that could not be written; nothing of it is in the file."""
+    """A row that could not be written; the file holds no part of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ class AuditEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class AuditRow(AuditEntry):
-    """An entry in its place.
+    """An entry with its row number and hash.
 
     Attributes:
         number: Number, from 1.
@@ -216,7 +216,7 @@ def _stored(row: AuditRow) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class FirstWrong:
-    """The first row that is wrong, and in what."""
+    """The first wrong row, and its fault."""
 
     number: int
     text: str
@@ -293,7 +293,7 @@ def _followed(file: sqlite3.Connection) -> Verified:
 
 
 def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
-    """Return what is wrong with row `number`, given the hash `head` of the row before it."""
+    """Return the fault of row `number`, given the hash `head` of the row before it."""
     if values[0] != number:
         return f"is missing: row {values[0]} follows row {number - 1}"
     *plain, before, stored = values

@@ -131,7 +131,7 @@ DIGITS = 11  # binary digits kept of 23: one part in 4000, and half the file
 
 
 def grids(playback: Playback) -> Iterator[ChannelMessage]:
-    """Yield all fields of the hazards there are, as far as they are not zero."""
+    """Yield all fields of the run's hazards, as far as they are not zero."""
     real = sorted((i for i in playback.incidents if not i.false_alarm), key=lambda i: i.kind)
     whats = dict.fromkeys(what for incident in real for what in incident.hazard.shows)
     west, south, east, north = playback.site.extent
@@ -187,7 +187,7 @@ MIN_GROWTH = 0.05  # least growth that is drawn again [m]
 
 
 def bodies(playback: Playback) -> Iterator[ChannelMessage]:
-    """Yield everybody, in a frame that moves with them; those who leave vanish."""
+    """Yield all robots and people, each in a frame that moves with it; those who leave vanish."""
     tracks = playback.recorder.tracks
     for name, track in tracks.items():
         robot = playback.robot_named(name)
@@ -213,7 +213,7 @@ def plan(site: Site) -> ChannelMessage:
 
 
 def hazards(playback: Playback) -> Iterator[ChannelMessage]:
-    """Yield real hazards, from their beginning until they are dealt with or the run ends."""
+    """Yield real hazards, from their beginning to their end or that of the run."""
     for number, incident, until in _real(playback):
         drawn = -math.inf
         for time in _steps(incident.start, until):
@@ -278,7 +278,7 @@ def _update(time: float, entity: dict[str, Any]) -> ChannelMessage:
 
 
 def removal(time: float, name: str) -> ChannelMessage:
-    """Return the removal of somebody or something that is drawn no longer."""
+    """Return the removal of a drawn body or hazard."""
     deletion = {"timestamp": messages.stamp(time), "type": 0, "id": name}
     return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
 
@@ -297,7 +297,7 @@ def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str,
 
 
 def body(time: float, name: str, radius: float = PERSON) -> ChannelMessage:
-    """Return somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
+    """Return a body in a frame that moves with it: `robot-1` is drawn as a robot."""
     kind = name.rpartition("-")[0]
     drawn_as = kind if kind in TALL else "robot"
     tall = TALL[drawn_as]
@@ -432,7 +432,7 @@ def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
-    """Return a message as it went onto the network; of a frame, what it stands for."""
+    """Return a message as it went onto the network; a camera frame without its picture."""
     if isinstance(sent.payload, CameraFrame):
         frame = sent.payload
         observation = frame.observation
@@ -459,7 +459,7 @@ def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
 
 
 def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[ChannelMessage]:
-    """Yield the traces of those who decide, line by line, by name."""
+    """Yield the traces of the agents that decide, line by line, by name."""
     for name, lines in traces.items():
         for time, line in lines:
             content = {"timestamp": messages.stamp(time), "line": line}

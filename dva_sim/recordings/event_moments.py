@@ -1,4 +1,4 @@
-"""Events of a recording at a moment, as the DVA's messages would have told of them then."""
+"""Events of a recording at a moment, as the DVA's messages reported them at that time."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _event_at(event: Event, now: float) -> Event | None:
 
 
 def _handling(facts: Sequence[Fact], number: int, now: float) -> Handling:
-    """Return the decisions on an event by then, where they were recorded."""
+    """Return the decisions on an event up to a moment, if they were recorded."""
     handling = Handling()
     for fact in facts:
         if fact.event != number or fact.time > now + ROUNDED or fact.code != m.OK:

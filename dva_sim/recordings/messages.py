@@ -51,7 +51,7 @@ def nanoseconds(time: float) -> int:
 
 
 def stamp(time: float) -> dict[str, int]:
-    """Return a moment [s] as messages hold it."""
+    """Return a moment [s] as a message's time stamp."""
     sec, nsec = divmod(nanoseconds(time), NS)
     return {"sec": sec, "nsec": nsec}
 
@@ -88,7 +88,7 @@ def colour(code: str, opacity: float = 1.0) -> dict[str, float]:
 
 
 def finite(value: float) -> float | None:
-    """Return a number as JSON has it: what never comes is null."""
+    """Return a number for JSON: infinity, which stands for never, is null."""
     return value if math.isfinite(value) else None
 
 

@@ -35,7 +35,7 @@ MAX_BYTES: Final = 64_000_000  # maximum size of a file: about two hours at 60 s
 
 
 class NoMotionOfOursError(ConfigError):
-    """A file is none that a console has written."""
+    """A file that was not written by a console."""
 
 
 class MotionSample(NamedTuple):

@@ -94,7 +94,7 @@ def _noise(samples: list[MotionSample]) -> float:
 
 
 def _resolution(samples: list[MotionSample]) -> float:
-    """Return the smallest step along an axis [m/s^2]; what is smaller than rounding is none."""
+    """Return the smallest step along an axis [m/s^2], except steps smaller than rounding."""
     smallest = math.inf
     for axis in zip(*(sample.xyz for sample in samples), strict=True):
         levels = sorted(set(axis))

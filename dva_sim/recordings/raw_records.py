@@ -49,7 +49,7 @@ class _Exactly:
 
 
 class DamagedError(Exception):
-    """The file does not contain what was written to it."""
+    """The file does not contain the bytes that were written to it."""
 
 
 @dataclass

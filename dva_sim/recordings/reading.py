@@ -46,7 +46,7 @@ Records = Sequence[tuple[float, Mapping[str, Any]]]  # messages of a topic, with
 
 
 class RecordedHazard(Hazard):
-    """A hazard as it was.
+    """A hazard as recorded.
 
     Attributes:
         times: Times of its records [s], in order.
@@ -176,7 +176,7 @@ class Opened:
 
 
 def read_recording(path: Path) -> Opened:
-    """Read a recording; of one that was cut short, all that is there.
+    """Read a recording; of one that was cut short, everything up to the cut.
 
     Raises:
         ConfigError: no such file, not a recording, a damaged one, or one of a later version.
@@ -357,7 +357,7 @@ def _point(time: float, content: Mapping[str, Any], mode: str) -> TrackPoint:
 def _track(
     contents: list[tuple[float, Any]], modes: list[tuple[float, Any]], period: float, end: float
 ) -> list[TrackPoint]:
-    """Return the samples of a track as taken, with those left out while somebody stands."""
+    """Return all samples of a track, also those left out while its agent stands still."""
     track: list[TrackPoint] = []
     turns = iter([*modes, (inf, {"activity": ""})])
     mode = ""

@@ -164,7 +164,7 @@ def _metre_of(
     path: Path,
     guesses: list[str],
 ) -> float:
-    """Return the m/s^2 in one unit of the axes."""
+    """Return the factor from the unit of the axes to m/s^2."""
     head = " ".join(columns.names[n] for n in columns.axes) if columns.names else ""
     if unit is None and _IN_MPS2.search(head):
         unit = "m/s2"

@@ -76,7 +76,7 @@ def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
 
 
 def _map_files(site: Site) -> dict[str, bytes]:
-    """Return a bare map in ROS map_server form, each cell as it was read."""
+    """Return a bare map in ROS map_server form, with the cells unchanged."""
     from PIL import Image
 
     grid = site.grid
@@ -205,7 +205,7 @@ def _beside(path: Path) -> Path:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
-    """Yield a file beside `path`, which takes its place if all goes well, and else is gone.
+    """Yield a file beside `path` that replaces `path` on success, and is removed otherwise.
 
     Raises:
         DvaSimError: it cannot be written.
@@ -224,7 +224,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def every_message(playback: Playback) -> Iterator[ChannelMessage]:
-    """Yield all messages of a recording, grouped by what they tell, not by time."""
+    """Yield all messages of a recording, grouped by subject, not by time."""
     yield from channels.ground(playback)
     yield from channels.activities(playback)
     yield from channels.bodies(playback)
@@ -327,7 +327,7 @@ def digest(files: Mapping[str, bytes]) -> str:
 
 
 def facts(playback: Playback) -> dict[str, Any]:
-    """Return what a player has to know besides the messages."""
+    """Return the metadata that a player needs besides the messages."""
     return {
         "format": FORMAT,
         "seed": playback.seed,
@@ -396,7 +396,7 @@ def _about(playback: Playback) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return tables as JSON has them: what is missing or never came is null."""
+    """Return tables for JSON: a missing or infinite number is null."""
     if isinstance(value, Mapping):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -107,7 +107,7 @@ class RosbridgeClient:
             self._dialer.connection.end(why)
 
     def close(self) -> None:
-        """Take back what was advertised and subscribed to, and end the connection."""
+        """Withdraw all subscriptions and advertisements, and end the connection."""
         self._is_over = True
         if self.is_connected:
             for topic in self._topics:

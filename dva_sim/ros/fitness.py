@@ -17,7 +17,7 @@ NO_BRIDGE: Final = "the bridge is not connected"
 
 
 class Fitness:
-    """Collects what is known of a robot.
+    """Reasons that a robot cannot be driven, by its messages and the state of the bridge.
 
     Odometry is late when none has come for `odometry_within_s`, or when it is that much older
     than the freshest so far: a bridge whose queue grows delivers steadily what is long past.
@@ -70,7 +70,7 @@ class Fitness:
         self._disabled = why
 
     def obeys(self, now: float, stopped_at: float, has_stood: bool) -> None:
-        """Note whether it has stood since it was told to, at a time [s]."""
+        """Note whether the robot has stood since it was ordered to stop, at `stopped_at` [s]."""
         self._does_not_stop = not has_stood and now - stopped_at > self._limits.stands_within_s
 
     def problem(self, now: float) -> str:

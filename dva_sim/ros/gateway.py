@@ -349,7 +349,7 @@ class RosGateway:
         return any(driver.is_driving for driver in self._drivers)
 
     def retire(self, driver: RosDriver) -> None:
-        """Stop what a client drove that is gone; the next one gets its device."""
+        """Stop the robots of a client that has left; the next client gets its device."""
         driver.release_all()
         self._free.append(driver)
 

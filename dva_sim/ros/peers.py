@@ -199,7 +199,7 @@ class RosPeer:
             self._connection.send(data)
 
     def say(self, what: str) -> None:
-        """Say what was refused; the same no more than once in a while."""
+        """Report a refusal to the client; the same one only once in a while."""
         now = self._host.now()
         if now - self._reported_at.get(what, -math.inf) >= SAY_AGAIN:
             if len(self._reported_at) > MAX_TOPICS:

@@ -1,4 +1,4 @@
-"""Messages of ROS 2 that say where our robots are and what they see."""
+"""Messages of ROS 2 with the positions, scans and pictures of our robots."""
 
 from __future__ import annotations
 

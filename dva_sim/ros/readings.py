@@ -59,7 +59,7 @@ def number(value: Any, what: str) -> float:
 
 
 def part(message: Any, *path: str) -> Any:
-    """Return what stands at a path of keys.
+    """Return the value at a path of keys.
 
     Raises:
         BadReading: it is not there.
@@ -114,7 +114,7 @@ class RosReader:
         self._origin = origin.x_m, origin.y_m
 
     def odometry(self, message: Any) -> RosMotion:
-        """Return what nav_msgs/Odometry says.
+        """Return the motion in a nav_msgs/Odometry.
 
         Raises:
             BadReading: it is not as it should be.

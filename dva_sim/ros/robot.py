@@ -218,7 +218,7 @@ class RosRobot:
         self.on_picture(picture)
 
     def _refused(self, topic: str, why: str) -> None:
-        """Count what was refused; tell it in one line, but not each time."""
+        """Count a refused message; report the same refusal only once in a while."""
         device = self.agent.device
         now = self._clock.now
         device.recorder.counters[f"refused from the robot: {topic or 'a message'}"] += 1

@@ -138,7 +138,7 @@ class RosbridgeServer:
             self._peers[connection] = None
 
     def _ping(self) -> None:
-        """Ask every client for a sign of life; cut those that gave none for too long."""
+        """Ping every client; cut those that have been silent for too long."""
         for connection, peer in list(self._peers.items()):
             if peer is not None and self._clock.now - connection.heard_at > SILENT:
                 connection.end(f"silent for {SILENT:g} s")
@@ -238,7 +238,7 @@ class RosbridgeServer:
             peer.offer(topic, self._map)
 
     def changed(self) -> None:
-        """See `PeerHost`: hear of each robot what somebody wants, and no more."""
+        """See `PeerHost`: subscribe to those topics of each robot that a client wants."""
         topics = {
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }

@@ -129,7 +129,7 @@ class WebSocketConnection:
                     return
 
     def push(self) -> None:
-        """Hand what the protocol has to say to the kernel, as far as that takes it."""
+        """Send the protocol's output, as far as the kernel takes it."""
         self._buffer += b"".join(self._protocol.data_to_send())
         self._flush()
 
@@ -183,7 +183,7 @@ class WebSocketConnection:
         return f"closed by the peer{f': {reason}' if reason else ''}"
 
     def _take(self, event: Any) -> None:
-        """Take what the protocol has read: a piece of a message, or of a handshake."""
+        """Handle an event of the protocol: a part of a message, or of a handshake."""
         opcode = getattr(event, "opcode", None)
         if opcode is None:
             self.on_event(event)

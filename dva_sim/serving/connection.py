@@ -1,4 +1,4 @@
-"""A connection of a port: counted among the others, and cut where its client does not read."""
+"""A connection of a port: counted, and cut if its client does not read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_LINGERING = struct.pack("ii", 1, 0)  # a reset: the kernel keeps nothing for 
 
 
 class HttpProtocol(H11Protocol):
-    """An HTTP connection that has a place among those of its port, and may be cut.
+    """An HTTP connection that its port counts, and may cut.
 
     uvicorn hides the connection from the application, but only there a client that does not read is
     noticed, and a connection with a token known. So both are handed through a request's scope.

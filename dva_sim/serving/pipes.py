@@ -1,4 +1,4 @@
-"""Pipes between processes, of which neither ever waits for the other.
+"""Pipes between two processes that never wait for each other.
 
 Lines of JSON that have no room wait in an outbox of a few, of some kinds only the newest; when it
 is full the oldest that may be lost is lost, and counted. Lines that must arrive, such as what an
@@ -96,7 +96,7 @@ class PipeEnd:
         return True
 
     def read(self) -> bytes | None:
-        """Return what has come since; None: nothing yet; no bytes: there will be no more."""
+        """Return the bytes received since; None if none yet, empty if the pipe has ended."""
         try:
             data = os.read(self._end, READ_BYTES)
         except BlockingIOError:
@@ -107,7 +107,7 @@ class PipeEnd:
         return data
 
     def lines(self) -> list[Line]:
-        """Return the lines that have come since; what is no line of JSON is left out."""
+        """Return the lines received since, except lines that are not JSON."""
         try:
             whole = self._lines.feed(self.read() or b"")
         except ValueError:
@@ -116,7 +116,7 @@ class PipeEnd:
         return [line for text in whole if (line := _read(text)) is not None]
 
     def close(self) -> None:
-        """Write what waits, if there is room, and nothing more; may be repeated.
+        """Write waiting lines as far as the pipe takes them, and close it; may be repeated.
 
         The number of the file may soon be that of another one.
         """
@@ -220,7 +220,7 @@ class LineOutbox:
         return len(self._waiting)
 
     def put(self, line: Mapping[str, Any], key: object = None) -> None:
-        """Add a line; `key` tells lines of one kind apart of which only the newest counts."""
+        """Add a line; of some kinds it replaces a waiting line with the same `key`."""
         kind = str(line.get("k"))
         self._number += 1
         key_of_line = (kind, key) if kind in self._kinds.newest else self._number

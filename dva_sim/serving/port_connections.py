@@ -136,7 +136,7 @@ class PortConnections:
 
 
 def _importance(slot: PortConnection) -> tuple[bool, int, float]:
-    """Requests with a token come first, then the rank; of the others the newest matter most.
+    """Return a sort key: requests with a token matter most, then the rank, then the newest.
 
     Without a token no request makes a connection newer: it would keep its place for ever.
     """

@@ -17,7 +17,7 @@ CLIENT: Final = 1  # rank of every admitted client
 
 
 class PortGuard:
-    """Refuses requests that may not pass, and counts the connections of the others as served.
+    """Refuses requests that may not pass; marks the connections of all others as served.
 
     Args:
         app: Application to guard.

@@ -140,7 +140,7 @@ class PortListener:
             asyncio.get_running_loop().add_reader(self._sock, self._accept)
 
     async def _connect(self, connection: socket.socket, slot: PortConnection) -> None:
-        """Shake hands, where that is needed; the protocol serves the connection from then on."""
+        """Make the TLS handshake, if any, and hand the connection to the protocol."""
         within = {} if self._context is None else _TLS
         protocol = self._make(slot)
         try:

@@ -115,7 +115,7 @@ class UserFile:
         password: str | None = None,
         locked: bool | None = None,
     ) -> None:
-        """Change a user; what is None stays.
+        """Change a user; values that are None stay.
 
         Raises:
             ConfigError: there is no such user, or the new values are not as they should be.

@@ -36,7 +36,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._place.leave()
 
     def keepalive_timeout(self) -> None:
-        """Cut a client that answers no ping; it will not read what waits for it either."""
+        """Cut a client that answers no ping: it will not read waiting data either."""
         super().keepalive_timeout()
         reset(self.transport)
 
@@ -46,7 +46,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         return self.transport.get_write_buffer_size()
 
     def drop(self, code: int, reason: str) -> None:
-        """Say why behind what is on its way, and wait no longer than a moment for all of it."""
+        """Send the reason after all waiting data, and cut the connection if that takes too long."""
         if self.disconnected or self.close_sent:
             return
         with suppress(InvalidState):  # the client is closing it at this moment

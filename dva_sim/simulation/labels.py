@@ -117,7 +117,7 @@ def measure_called(name: str, model: str = "") -> Measure:
 
 
 def factor_name(factor: str) -> str:
-    """Return the one-way delay, for `link.delay_s`."""
+    """Return a factor's name in words: `one-way delay` for `link.delay_s`."""
     key = _keys().get(factor)
     habit = factor.partition(".habits.")[2]
     return key.title if key else _OF_STUDIES.get(factor, without_unit(habit or factor))

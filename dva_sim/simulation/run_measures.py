@@ -21,7 +21,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
 
 class RunMeasure:
-    """A number taken of what is left of a run; it becomes a column of the table of runs.
+    """A number from the results of a run; it becomes a column of the table of runs.
 
     Attributes:
         about: Its name, meaning, title and bounds; the name ends in the unit.

@@ -1,10 +1,10 @@
-"""Differences adjusted for what is known of persons and trials before they are run.
+"""Differences adjusted for properties of persons and trials that are known before the runs.
 
-Whether the persons drawn are cautious, or their ways long, is known, and so is how it is on the
-average of all. What the sample has more of than that, times what it does to the difference, is
-taken off (control variates). The slope is learned from the same persons. Instead of their means,
-persons then enter with their jackknife pseudo-values, which carry what not knowing the slope
-costs: all intervals and bands are made of them as of the means.
+It is known how cautious the drawn persons are and how long their ways, and also the average of
+all persons. The excess of the sample over that average, times its effect on the difference (the
+slope), is subtracted (control variates). The slope is estimated from the same persons. So persons
+enter not with their means but with their jackknife pseudo-values, which include the uncertainty
+of the slope: all intervals and bands are made of them as of means.
 
 References:
     Lavenberg, Moeller & Welch, Oper. Res. 30 (1982) 182-202 (control variates for simulations);

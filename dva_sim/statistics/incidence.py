@@ -183,7 +183,7 @@ def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[flo
 
 
 def _interval(share: Floats, persons: int, runs: int) -> Interval:
-    """Return the interval of the share `[0]` by what it is without each person `[1:]`."""
+    """Return the interval of the share `[0]` by the shares without each person `[1:]`."""
     if persons < 2:
         estimate = float(share[0]) if persons else math.nan
         return Interval(estimate, math.nan, math.nan, persons)

@@ -1,4 +1,4 @@
-"""Morris's screening: which of many factors move an outcome, and which way, from few runs.
+"""Morris's screening: the size and sign of the effects of many factors, from few runs.
 
 References:
     M. D. Morris: Factorial sampling plans for preliminary computational experiments. Technometrics
@@ -36,12 +36,12 @@ def trajectories(axes: int, count: int, rng: np.random.Generator) -> Floats:
 
 @dataclass(frozen=True)
 class ElementaryEffects:
-    """Effects of one factor, each over its whole band, at different places of the others.
+    """Effects of one factor, each over its whole band, at different values of the other factors.
 
     Attributes:
-        mean: Mean effect, with its interval over trajectories: its sign is which way.
-        size: Mean of the absolute effects: how much, even if the sign differs from place to place.
-        spread: Standard deviation of the effects: interactions, curves, and what is left of chance.
+        mean: Mean effect, with its interval over trajectories: its sign is the direction.
+        size: Mean of the absolute effects, which do not cancel if their signs differ.
+        spread: Standard deviation of the effects: interactions, curvature, and remaining chance.
     """
 
     mean: Interval

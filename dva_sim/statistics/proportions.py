@@ -100,7 +100,7 @@ def _variance(flags: Floats, code: NDArray[np.intp]) -> float:
 
 
 def _runs_worth(share: float, variance: float, persons: int, runs: int) -> float:
-    """Independent runs worth as much as these, less for what the variance itself is unsure by."""
+    """Return the number of equivalent independent runs, reduced as the variance is estimated."""
     if not 0 < share < 1:
         n = float(persons)
     else:

@@ -14,7 +14,7 @@ from dva_sim.testing.shipped_words import FILE
 
 
 def from_docstrings() -> dict[str, dict[str, str]]:
-    """Load the shipped plug-ins; return what the file should hold, by kind and name."""
+    """Load the shipped plug-ins; return the correct contents of the file, by kind and name."""
     return {name: dict(sorted(kind.docstrings().items())) for name, kind in TRIALS.items()}
 
 

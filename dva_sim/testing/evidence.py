@@ -140,7 +140,7 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
 
 
 def _lacking(opened: Opened) -> Iterator[str]:
-    """Yield what was left out of a recording, as far as it shows that."""
+    """Yield the kinds of facts that a recording lacks, as far as it shows that."""
     from dva_sim.recordings.channels import OBSERVED  # late: start-up
     from dva_sim.recordings.writing import COUNTS  # late: start-up
     from dva_sim.simulation.full import observations as o  # late: start-up
@@ -165,7 +165,7 @@ def check_trace(path: Path) -> Found:
 
 
 def check_audit_log(path: Path) -> Found:
-    """Return the first row of an audit log that is wrong, what is odd in it, and its last hash.
+    """Return the first wrong row of an audit log, its oddities, and its last hash.
 
     A problem's line is the row's number.
     """
@@ -235,7 +235,7 @@ def _spread_of(delays: Floats) -> str:
 
 
 class _Replayed(NamedTuple):
-    """Number of decisions replayed, and those that differ."""
+    """Number of decisions replayed, and the decisions that differ."""
 
     decisions: int
     problems: list[Problem]

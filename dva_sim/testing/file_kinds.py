@@ -67,7 +67,7 @@ def check_config(kind: FileKind, document: Document) -> list[Problem]:
 
 
 def _mistakes(model: type[Config], document: Document) -> Iterator[ConfigError]:
-    """Yield mistakes of which there may be several; the only one is raised."""
+    """Yield mistakes of files that may have several; a file's only mistake is raised."""
     if model in _CHECKS:
         yield from _CHECKS[model](document)
     elif model in _LOADERS:
@@ -92,7 +92,7 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
 
 
 def notes(kind: FileKind, document: Document) -> str:
-    """Describe what a valid file holds, or promises less of than it prints, in a line."""
+    """Describe a valid file in a line: its contents, or limits of the answer that it promises."""
     if kind.model is Study:
         return "; ".join(coverage_remarks(load_study(document.file)))
     if kind.model in (Scenario, TimedScenario):
@@ -169,7 +169,7 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
 
 
 def _check_registration(document: Document) -> Iterator[ConfigError]:
-    """Yield the registration, and whether the study beside it is still what was registered."""
+    """Yield the departures of the study beside a registration from the registered plan."""
     registered = load_registration(document)
     file = document.file.parent / f"{registered.study}.yaml"
     if not file.is_file():

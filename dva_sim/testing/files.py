@@ -1,4 +1,4 @@
-"""One file: what kind it is of, what is wrong with it, and which schema such files follow."""
+"""One file: its kind, its mistakes, and the schema of such files."""
 
 from __future__ import annotations
 

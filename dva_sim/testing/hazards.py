@@ -147,7 +147,7 @@ class _Trial:
     # --- on a site ---------------------------------------------------------------------
 
     def _answers(self, field: HazardField, order: list[int] | None = None) -> list[Conditions]:
-        """Return the air at all places and ages, asked in an order; told in the usual one."""
+        """Return the air at all places and ages, queried in any order, returned in a fixed one."""
         queries = [(*place, START + age) for age in AGES for place in NEARBY_PLACES]
         order = order or list(range(len(queries)))
         began = time.perf_counter()
@@ -212,7 +212,7 @@ class _Trial:
                 yield "hides otherwise than its air says", f"after {age:g} s"
 
     def _pictures(self) -> Iterator[Case]:
-        """Yield a raster for what it shows, of numbers, empty before it begins."""
+        """Yield mistakes of rasters: one for each shown quantity, empty up to the beginning."""
         field = self._field()
         west, south, east, north = self._site.extent
         x = np.arange(west, east, CELL)

@@ -86,7 +86,7 @@ def check_operator(
 
 
 class _Step(NamedTuple):
-    """A moment of a drive: time [s], place [m], what was wanted."""
+    """A moment of a drive: time [s], place [m] and the wanted motion."""
 
     time: float
     x: float

@@ -170,7 +170,7 @@ class TriedDrive:
 
     @property
     def held(self) -> int:
-        """Commands of which nothing is known yet."""
+        """Number of commands neither sent nor superseded yet."""
         return self.offered - len(self.sent) - len(self.superseded)
 
     def _send(self, command: Any) -> bytes:
@@ -231,7 +231,7 @@ class TriedDrive:
         self.network.publish(self.node, command_topic(self.robot), data, len(data))
 
     def newest(self, command: Any) -> Any:
-        """See `Line`: this app keeps what it has made."""
+        """See `Line`: returns the command itself, as this app keeps it."""
         return command
 
     def supersede(self, command: Any) -> None:
@@ -304,7 +304,7 @@ class _Trial:
         return drive
 
     def _run(self, drive: TriedDrive, until: float = LONG) -> Iterator[Case]:
-        """Go on, and tell what is wrong whatever the link and the robot are like."""
+        """Run on, and yield mistakes that no state of the link or the robot excuses."""
         drive.clock.run(until)
         self.took.append(drive.spent / max(drive.offered, 1))
         yield from drive.wrong

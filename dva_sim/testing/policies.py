@@ -283,7 +283,7 @@ def check_policy(
 
 @dataclass(frozen=True)
 class _Answer:
-    """Advice, how long it took [s], and what happened that should not."""
+    """Advice, the time that it took [s], and broken promises."""
 
     advice: Any
     took: float
@@ -308,7 +308,7 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
 def _broken(
     policy: Policy, situation: Situation, answer: _Answer, twin_answer: _Answer
 ) -> Iterator[Case]:
-    """Yield the promises that an answer breaks, also in comparison with the other one's."""
+    """Yield the promises that an answer breaks, also compared with its twin's answer."""
     yield from answer.broke
     advice = answer.advice
     if not isinstance(advice, Sequence) or isinstance(advice, str | bytes):
@@ -324,7 +324,7 @@ def _broken(
 
 
 def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:
-    """Yield the advice of a wrong type, or about what is not there."""
+    """Yield the advice of a wrong type, or about missing tasks, responders or stations."""
     stations = len(situation.cover.stations) if situation.cover else 0
     lengths = {
         Assignment: {"task": len(situation.tasks), "responder": len(situation.responders)},
@@ -403,5 +403,5 @@ def _bad_move(situation: Situation, move: Relocation) -> Iterator[Case]:
 
 
 def _contents(situation: Situation) -> bytes:
-    """Return all that a situation holds, arrays as they are now."""
+    """Return the contents of a situation, with its arrays, for later comparison."""
     return pickle.dumps([getattr(situation, field.name) for field in fields(situation)])

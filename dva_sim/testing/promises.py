@@ -1,4 +1,4 @@
-"""Kinds of things that are tried rather than read, and what comes of trying one.
+"""Kinds of plug-ins that are tried rather than read, and the outcomes of trials.
 
 `TRIALS` is an index, not the things: modules are named, and imported when one of their kind is
 asked for. To add a kind, add it there, and the module whose `check_KIND` tries one.

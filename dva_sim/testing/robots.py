@@ -64,7 +64,7 @@ def _spec(robot: str | Callable[..., Drive], options: Mapping[str, Any]) -> Driv
 
 @dataclass
 class _State:
-    """Motion on a floor that holds: what the motors do happens."""
+    """Motion on a floor with grip: the robot moves as its motors turn."""
 
     drive: Drive
     dt: float

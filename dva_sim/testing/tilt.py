@@ -119,7 +119,7 @@ class _FilterTrial:
             yield "is not zero before the first sample", _pair_text(value)
 
     def _bounds(self) -> Iterator[Case]:
-        """Yield cases that must be finite, and never beyond what came in, or zero."""
+        """Yield values that are not finite, or lie beyond the samples and zero."""
         hostile = [(one, other) for one in HOSTILE for other in HOSTILE]
         for number in range(RUNS):
             samples = self._samples() if number else hostile
@@ -329,7 +329,7 @@ class _MappingTrial:
                     yield "would tilt to what is no number", f"for {_pair_text(command)}"
 
     def _steered(self) -> Iterator[Case]:
-        """Yield a hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
+        """Yield mistakes of `tilt_for`: its tilt should reach the wanted command, and keep it."""
         for command in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
             mapping = self.make()
             shown = (0.0, 0.0)

@@ -151,7 +151,7 @@ class _Trial:
 
 
 class _Robot:
-    """The robot's end in a thread of its own: keeps what it hears, sends what it is given."""
+    """The robot's end in a thread of its own: keeps received commands, sends given pictures."""
 
     def __init__(self, make: Callable[[], CommandTransport], port: int) -> None:
         self._make = make
@@ -182,7 +182,7 @@ class _Robot:
         self._is_paused.wait(SLACK_S)
 
     def go_on(self) -> None:
-        """Take what has come, and what comes."""
+        """Resume, and take all data received meanwhile."""
         self._paused.clear()
 
     def _hear(self, data: bytes) -> bytes:

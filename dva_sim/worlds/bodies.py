@@ -117,7 +117,7 @@ T = TypeVar("T")
 
 
 class AskedFor(Generic[T]):
-    """Commands to a body: the one in force, and those of later ticks.
+    """Commands to a body: the current one, and those of later ticks.
 
     A command still acts in its tick, however soon a newer one follows.
 
@@ -143,7 +143,7 @@ class AskedFor(Generic[T]):
 
     @property
     def newest(self) -> T:
-        """Value that was put last."""
+        """Value that was set last."""
         return self.coming[-1][1] if self.coming else self.now
 
     def at(self, tick: int) -> T:
@@ -261,7 +261,7 @@ class Body:
 
     @property
     def contacts(self) -> int:
-        """Contacts begun so far: of a robot with anything, of a person with robots."""
+        """Number of contacts so far: of a robot with anything, of a person with robots."""
         return self._touch.count
 
     @property
@@ -279,21 +279,21 @@ class Body:
         raise NotImplementedError
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
-        """Return the contacts among which one with a body, or a wall (None), is counted."""
+        """Return the counters of a contact with a body, or with a wall (None)."""
         raise NotImplementedError
 
     def meets(self, other: Body | None, now: float) -> None:
-        """Note that it begins to touch somebody, or a wall (None)."""
+        """Begin a contact with a body, or with a wall (None)."""
         for contacts in self.counts(other):
             contacts.begin(now)
 
     def parts(self, other: Body | None, now: float) -> None:
-        """Note that it touches somebody, or a wall (None), no longer."""
+        """End a contact with a body, or with a wall (None)."""
         for contacts in self.counts(other):
             contacts.end(now)
 
     def feels(self, other: Body | None, impulse: float) -> None:
-        """Note that a contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
+        """Add the impulse of a contact with a body, or with a wall (None) [N s]."""
         self._world.wake(self)
         if self.counts(other):
             self.impulse += impulse
@@ -410,7 +410,7 @@ class RobotBody(Body):
 
     @property
     def person_contacts(self) -> int:
-        """Contacts with people begun so far."""
+        """Number of contacts with people so far."""
         return self._people.count
 
     @property
@@ -551,13 +551,13 @@ class RobotBody(Body):
         return True
 
     def _is_held(self, dt: float) -> bool:
-        """Return True if its locked wheels hold it; also where its brakes were too weak."""
+        """Return True if locked wheels hold it; they lock if the brakes take too long."""
         self._braked += dt
         if self._braked > self._patience and not self._lock.closed:
             self._lock.close(self._grip)
         return self._lock.closed
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
-        """Return all; those with people by themselves, too."""
+        """Return the counter of all contacts; with a person, also that of contacts with people."""
         person = other is not None and other.kind == PERSON
         return (self._touch, self._people) if person else (self._touch,)

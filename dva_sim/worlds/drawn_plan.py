@@ -98,7 +98,7 @@ def _holes(feature: Feature) -> tuple[Points, ...]:
 
 
 def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
-    """Return rooms need names of their own; paths and yards may go without."""
+    """Return the rooms; each needs a name of its own, paths and yards may go without."""
     rooms: list[Room] = []
     for kind in GROUND:
         for number, feature in enumerate(kinds[kind], 1):
@@ -154,7 +154,7 @@ def _ends(line: Any) -> list[float]:
 
 
 def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int:
-    """Classify what lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
+    """Classify the place beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
     room = beyond(rooms, x, y, heading)
     return NOTHING if room is None else int(room.outdoor)
 

@@ -61,7 +61,7 @@ class Drive:
 
 
 class Differential(Drive):
-    """Drive by two wheels: speed and turn rate each follow with a time constant, limited."""
+    """Two driven wheels: speed and turn rate follow each with one time constant, limited."""
 
     def __init__(self, spec: DriveSpec) -> None:
         super().__init__(spec)
@@ -86,7 +86,7 @@ class Differential(Drive):
 
 
 class ThreeWay(Drive):
-    """Drive of a model car: its motor has a duty, its steering only left, straight and right.
+    """A model car: the motor by duty, steering that knows only left, straight and right.
 
     The car follows its front wheels: turn rate = speed / radius to either side, or zero, so it
     cannot turn on the spot. A wanted speed and turn rate are met as follows:
@@ -281,7 +281,7 @@ def load_drive(
     options: Mapping[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[DriveSpec], Drive]:
-    """Return a factory for the motors of a name; those of users are kept within the limits.
+    """Return a factory for the motors of a name; motors of users are kept within the limits.
 
     Args:
         name: `differential`, `three_way`, a class in a file such as `mine.py:Mine`, or the name

@@ -32,7 +32,7 @@ from dva_sim.worlds.storeys import storeys_of, to_choose_from
 
 
 class DrawnFeature(BaseModel):
-    """Properties of a feature; what an editor adds of its own is left alone."""
+    """Properties of a feature; properties that an editor adds are ignored."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
@@ -98,7 +98,7 @@ class DrawnWifi(DrawnFeature):
 
     @property
     def link(self) -> LinkQuality:
-        """Loss, rate and delay; those that are not given come with the quality."""
+        """Loss, rate and delay; a missing one is that of the quality."""
         return QUALITIES[self.quality or "good"]._replace(**self.numbers)
 
 
@@ -198,7 +198,7 @@ def read_features(path: Path, frame: GeoFrame, level: str | None = None) -> Iter
 
 
 def storeys(path: Path) -> list[str]:
-    """Return the storeys of which a site has to choose one; empty if its plan has only one.
+    """Return the storeys among which a site has to choose; empty if its plan has only one.
 
     Raises:
         ConfigError: not GeoJSON.

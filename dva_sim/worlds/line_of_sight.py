@@ -1,4 +1,4 @@
-"""Lines of sight: walls hide what is behind them."""
+"""Lines of sight, which walls block."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Sight:
     def between(self, a: Point, b: Point) -> bool:
         """Return True if no wall stands between two places [m]; repeated queries are cached.
 
-        A wall blocks when its ends lie on both sides of the line a-b and a and b on both
-        sides of the wall: not for who stands on its line, as in an exit, however rounded.
+        A wall blocks if its ends lie on both sides of the line a-b, and a and b on both sides of
+        the wall. So it never blocks the sight of a point on its own line, as in an exit.
         """
         return self._kept(a, b)
 

@@ -114,7 +114,7 @@ class Layout:
 
 
 def tenths(value: float) -> float:
-    """Return walls lie on a lattice of 0.1 m."""
+    """Return a length rounded to 0.1 m, the lattice on which walls lie."""
     return round(float(value), 1)
 
 
@@ -144,7 +144,7 @@ def lay_out(width: float, depth: float, rng: np.random.Generator) -> Layout:
 def _crossings(
     corridors: list[Box], width: float, rng: np.random.Generator
 ) -> tuple[tuple[Box, ...], ...]:
-    """Cross corridors evenly along the others, each a few metres off."""
+    """Cross corridors at even distances along the corridors, each moved by a few metres."""
     count = max(1, round(width / CROSSING_EVERY))
     crossings = []
     for number in range(count):
@@ -229,13 +229,13 @@ def _nothing(_: FloorCell) -> Iterator[Box]:
 
 
 def _desk(cell: FloorCell) -> Iterator[Box]:
-    """Yield one desk or two at the window."""
+    """Yield one desk or two desks at the window."""
     side = tenths((cell.width - min(cell.width - 1.2, 3.2)) / 2)
     yield cell.box(side, side, cell.depth - 0.8, 0.0)
 
 
 def _table(cell: FloorCell) -> Iterator[Box]:
-    """Yield something large in the middle that one can walk around."""
+    """Yield a large piece of furniture in the middle that people can walk around."""
     if cell.width >= 3.4 and cell.depth >= 3.4:
         yield cell.box(1.2, 1.2, 1.2, 1.2)
 

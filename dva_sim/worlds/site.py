@@ -170,7 +170,7 @@ class Site(FloorPlan):
     def sample_free(
         self, rng: np.random.Generator, clearance: float, room: str | None = None
     ) -> tuple[float, float]:
-        """Return a random free point that a robot can reach, or somebody slimmer if so asked.
+        """Return a random free point that a robot, or a body of another clearance, can reach.
 
         Args:
             rng: Random generator.
@@ -408,7 +408,7 @@ class _Places:
         self._left: Floats | None = None  # middles `(n, 2)` of free cells, once they are few
 
     def draw(self, rng: np.random.Generator) -> tuple[float, float] | None:
-        """Return one more place [m], which is taken then; None if there is none."""
+        """Take one more place [m] and return it; None if none is left."""
         place = self._at_random(rng) if self._left is None else None
         if place is None:
             place = self._of_those_left(rng)
@@ -528,7 +528,7 @@ def _load_site(path: Path, options: str) -> Site:
 
 
 def doubts_of_site(document: Document) -> list[str]:
-    """List what a valid site's plan has that is ignored, in sentences without full stop."""
+    """List the ignored parts of a valid site's plan, in sentences without full stop."""
     plan = document.data.get("plan")
     return [] if plan is None else doubts_of_plan(document.file.parent / plan)
 

@@ -78,7 +78,7 @@ def _ground(room: Room, ceiling: float) -> Feature:
 
 
 def _floor(site: Site) -> Iterator[Feature]:
-    """Yield the floor of a bare map as one room, with what stands in it as solids."""
+    """Yield the floor of a bare map as one room, and the obstacles in it as solids."""
     walls = [shapely.LineString(wall.reshape(2, 2)) for wall in site.walls]
     pieces = shapely.get_parts(shapely.union_all(walls))  # cut where they cross
     faces: list[Any] = list(shapely.get_parts(shapely.polygonize(list(pieces))))

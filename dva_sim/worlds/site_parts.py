@@ -90,7 +90,7 @@ class Lookup(Generic[T]):
         return next((area for area in near if area.contains(x, y)), None)
 
     def _areas_near(self, column: int, row: int) -> list[T]:
-        """Return those whose box touches a square of a lattice."""
+        """Return the areas whose box touches a square of a lattice."""
         low = np.array([column, row]) * SQUARE
         high = np.array([column + 1, row + 1]) * SQUARE
         touch = np.all((self._boxes[:, :2] <= high) & (self._boxes[:, 2:] >= low), axis=1)
@@ -214,7 +214,7 @@ class FixedCamera(NamedTuple):
 
 
 class BaseStation(NamedTuple):
-    """An antenna: what it speaks (wifi, lte, nr), where [m]."""
+    """An antenna: its kind of network (wifi, lte, nr) and position [m]."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""Storeys of a plan, by the property `level` of its features, as OpenStreetMap has it."""
+"""Storeys of a plan, by the property `level` of its features, as in OpenStreetMap."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def storeys_of(properties: Mapping[str, Any]) -> frozenset[str]:
 
 
 def to_choose_from(features: Iterable[frozenset[str]]) -> list[str]:
-    """Return the storeys of which a plan needs one; empty if all its features share a storey."""
+    """Return the storeys among which a plan has to choose; empty if all features share one."""
     on = [storeys for storeys in features if storeys]
     if not on or frozenset.intersection(*on):
         return []

@@ -112,7 +112,7 @@ def draw_site(
 
 
 def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return what a picture of a site shows, with the scale bar: ranges of x and of y [m]."""
+    """Return the extent of a picture of a site, with the scale bar: ranges of x and of y [m]."""
     xmin, ymin, xmax, ymax = site.extent
     margin, below = (
         max(least, share * (xmax - xmin)) for least, share in (MARGIN, SCALE_BAR_PLACE)
@@ -142,7 +142,7 @@ def _draw_rooms(ax: Axes, site: Site) -> None:
 
 
 def _draw_grid(ax: Axes, site: Site) -> None:
-    """Draw the floor of a bare map, and what stands on it."""
+    """Draw the floor of a bare map, and the obstacles on it."""
     grid = site.grid
     floor = grid.floor(FOOTPRINT)
     shades = np.ma.masked_where(~ndimage.binary_fill_holes(floor), floor)
@@ -164,7 +164,7 @@ def _draw_grid(ax: Axes, site: Site) -> None:
 
 # --- walls and ways through them -------------------------------------------------------
 def _draw_walls(ax: Axes, site: Site) -> None:
-    """Draw walls as one shape in metres, so that they keep their width when somebody zooms."""
+    """Draw walls as one shape in metres, so that zooming keeps their width in proportion."""
     width = WALL_WIDTH if site.rooms else WALL_WIDTH / 2
     lines = shapely.multilinestrings(site.wall_lines.reshape(-1, 2, 2))
     area = shapely.buffer(lines, width / 2, cap_style="square", join_style="mitre")
@@ -308,7 +308,7 @@ def poster(site: Site, coverage: bool) -> Figure:
 
 
 def _handles(site: Site, coverage: bool) -> list[Artist]:
-    """Return handles only of what is there."""
+    """Return handles of the marks that the site has."""
     handles = [_mark("P", "guard post", INK)] if site.guard_posts else []
     if site.robot_bases:
         handles.insert(0, _mark("o", "robot base", INK, mfc="none", ms=6))

@@ -119,7 +119,7 @@ def draw_views(ax: Axes, site: Site) -> None:
 
 
 def view_of(site: Site, camera: FixedCamera) -> Floats:
-    """Return corners `(n, 2)` [m] of what a camera sees up to its range; walls hide the rest."""
+    """Return corners `(n, 2)` [m] of the floor in a camera's view, limited by walls and range."""
     spread = np.linspace(-0.5, 0.5, RAYS) * camera.field_of_view
     rays = np.stack([np.cos(camera.heading + spread), np.sin(camera.heading + spread)], axis=1)
     eye = np.array([camera.x, camera.y])
@@ -197,7 +197,7 @@ def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
 
 
 def _things(site: Site) -> list[Any]:
-    """Return what names should not cover."""
+    """Return the marks, door leaves and solids that names should not cover."""
     marks = [(d.x, d.y, 0.3) for d in site.detectors]
     marks += [(s.x, s.y, 0.5) for s in site.base_stations]
     marks += [(c.x, c.y, 0.3) for c in site.cameras]
@@ -238,7 +238,7 @@ def _best(
 
 @lru_cache(maxsize=4096)
 def _settings(name: str) -> tuple[NameLayout, ...]:
-    """Return all ways to write a name, the most legible first; at last only its number."""
+    """Return all ways to write a name, the most legible first; the last is only its number."""
     texts = [(text, 1.0) for text in _wraps(name)]
     number = re.search(r"\w?\d+$|\b[A-Z]$", name)
     texts += [(number[0], ABRIDGED)] if number else []

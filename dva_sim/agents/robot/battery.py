@@ -18,8 +18,8 @@ class BatteryProfile(Config):
     Attributes:
         idle_w: Power of computer, sensors and radio, driving or not.
         rolling_resistance: Force against rolling by weight.
-        efficiency: Share of the energy that reaches the floor.
-        charging_w: Charging power of the base, on top of the consumption meanwhile.
+        efficiency: Share of the energy taken that reaches the floor.
+        charging_w: Charging power of the base, besides what is used meanwhile.
 
     References:
         J. Y. Wong: Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 1: rolling resistance

@@ -193,7 +193,7 @@ KINDS = {
 
 
 class FaultConfig(Config):
-    """Fault of a sensor, at a set time or a random one.
+    """One way in which a sensor fails, at a time or by chance.
 
     Attributes:
         kind: `lost`: no values from then on. `stuck`: the last values for ever.
@@ -219,7 +219,7 @@ class FaultConfig(Config):
 
 
 class SensorConfig(Config):
-    """Sensor that a robot carries; by default it has the properties of its kind (`KINDS`).
+    """A sensor that a robot carries; what is left out is as usual for its kind (`KINDS`).
 
     Attributes:
         name: Name of the kind.

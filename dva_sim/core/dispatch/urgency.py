@@ -36,7 +36,7 @@ class PriorityEta(Policy):
 
 
 class Preemptive(Policy):
-    """`priority_eta` with preemption: clearly more urgent tasks may take a busy responder.
+    """`priority_eta` with preemption: responders may be redirected to clearly more urgent tasks.
 
     It does so only if no idle responder can serve the task well: not at all, or much later. What
     is left behind waits again, and is seen as such by the next decision.

@@ -133,10 +133,7 @@ class RunGrid:
         return np.asarray(self.grid(column) - self.reference(column))
 
     def outcome(self, column: str) -> Floats:
-        """Return the grid of a column as it is judged.
-
-        In excess of the reference where there is one.
-        """
+        """Return the grid of a column, in excess of the reference if the column has one."""
         return self.excess(column) if self.has_reference(column) else self.grid(column)
 
     def has_reference(self, column: str) -> bool:

@@ -111,7 +111,7 @@ class DaskCluster(Workers):
             executor.shutdown(wait=False)
 
     def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
-        """Return the task, refused by workers of another program."""
+        """Return a task that workers with other versions of the program refuse."""
         return partial(_checked, task, versions())
 
     def look_after(self, is_idle: bool) -> None:

@@ -37,9 +37,9 @@ class SampledRun(NamedTuple):
 
 
 def sampled_jobs(study: Study) -> Iterator[StudyJob]:
-    """Yield the few runs, part by part.
+    """Yield a sample of the study's runs, part by part.
 
-    There are none of a study whose runs are measured in real time.
+    A study whose runs are measured in real time has no sample.
     """
     plan = StudyPlan.of(study)
     if plan.is_real_time:

@@ -171,7 +171,7 @@ def _comparisons(reading: Reading) -> Iterator[Block]:
 def _endings(reading: Reading) -> Iterator[Block]:
     """Yield the table of outcomes if some runs went wrong.
 
-    Else a line, unless the answer has one.
+    If all went well, yield a line about that, unless the answer has one.
     """
     endings = reading.endings
     view = reading.view
@@ -210,7 +210,7 @@ def _found(reading: Reading) -> Iterator[Block]:
 
 
 def _what_varied(reading: Reading) -> Iterator[Block]:
-    """Yield what varied, before the figures, whose words must be known."""
+    """Yield the varied factors, before the figures, which use their names."""
     factors = [f for f in factors_of(reading.study) if f.name != POINT]
     design = reading.study.get("design") or {}
     lines = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]

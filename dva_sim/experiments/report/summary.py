@@ -134,7 +134,7 @@ class Reading(ResultsReading):
 
     @property
     def _decided(self) -> set[str]:
-        """Hypotheses and comparisons that need no more persons."""
+        """Names of hypotheses and comparisons that are decided, so need no more persons."""
         tested = self.judgement.tested
         shown = 1 - statistics.LEVEL
         at_last = {c.name: c.adjusted <= shown for c in self.judgement.compared}  # as planned

@@ -157,7 +157,7 @@ def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
 def edited_files() -> Iterator[tuple[str, Path]]:
     """Yield profiles, sites and schemas within reach: each name once, from the nearest folder.
 
-    No run reads pictures.
+    Pictures are left out, as no run reads them.
     """
     seen: dict[str, Path] = {}
     for root in resources.roots():

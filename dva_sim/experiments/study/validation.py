@@ -203,7 +203,7 @@ def of_claims(study: Study) -> Iterator[Problem]:
 
 
 def kept_claims(study: Study) -> Study:
-    """Return the study without declarations about parts, factors or levels that are gone.
+    """Return the study without declarations about parts, factors or levels that it no longer has.
 
     An answer without its levels takes the two that its factor has left, if it has two. Predictions
     stay; each is reported as not run.
@@ -256,7 +256,7 @@ def _of_answer_as_declared(study: Study) -> Iterator[Prediction]:
 
 
 def _kept_map(study: Study) -> MapRule | None:
-    """Return the map without its notes about levels that are gone."""
+    """Return the map without notes about levels that the study no longer has."""
     if study.map is None:
         return None
     gone = {path[-1] for _, path in of_map(study) if path[:2] == ("map", "notes")}

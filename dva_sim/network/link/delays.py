@@ -41,7 +41,7 @@ def by_quantile(quantile: Quantile, uniforms: UniformNumbers) -> Wobble:
 
 
 class ConstantDelay(Config):
-    """Constant delay `delay_s` of all packets: the default."""
+    """All packets take `delay_s`: what is meant where no law is named."""
 
     law: Literal["constant"]
 
@@ -173,8 +173,8 @@ class Empirical(_Law):
     """One of the given delays each time; `delay_s` comes on top of them.
 
     Attributes:
-        delays_s: The delays; alternative to `file`.
-        file: File with one delay per line [ms].
+        delays_s: The delays; or else
+        file: names a file with one a line [ms].
     """
 
     law: Literal["empirical"]

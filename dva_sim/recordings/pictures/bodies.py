@@ -1,4 +1,4 @@
-"""Robots and people from above: where they are and head for, what they do, where they were."""
+"""Robots and people from above, with their goals, activities and trails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours of who and what is on a picture from above; nothing here draws."""
+"""Colours of people, robots and hazards on a picture from above; without drawing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hazards as fields over the floor: smoke, heat, gas and water, and where they come from."""
+"""Hazards as fields over the floor: smoke, heat, gas and water, and their sources."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class _Contours:
             ax.add_collection(lines, autolim=False)
 
     def show(self, raster: Raster) -> list[Artist]:
-        """Return those of a field."""
+        """Return the hazards of a field."""
         west, east, south, north = raster.extent
         rows, columns = raster.values.shape
         x = west + (np.arange(columns) + 0.5) * (east - west) / columns
@@ -121,7 +121,7 @@ class _Source:
         )  # fmt: skip
 
     def show(self, moments: Moments, time: float) -> list[Artist]:
-        """Return those of a kind that go on."""
+        """Return the active hazards of a kind."""
         hazards = (incident.hazard for incident in moments.going_on(time))
         places = [hazard.position for hazard in hazards if hazard.title == self._title]
         if not places:

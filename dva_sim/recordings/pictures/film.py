@@ -90,7 +90,7 @@ class Film:
 
 
 class _Eye:
-    """Picture on the screen of the operator who is driving, or else what a robot sees now.
+    """Picture on the screen of the operator who is driving, or else a robot's camera view.
 
     Args:
         ax: Axes to draw on.

@@ -78,7 +78,7 @@ def _write_gif(film: Film, path: Path) -> None:
 
 
 def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
-    """Yield pictures that change only where one can see it: what stays the same takes no room."""
+    """Yield pictures without changes too small to see, since equal pixels take no space."""
     previous = next(frames)
     yield previous
     for frame in frames:

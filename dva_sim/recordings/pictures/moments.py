@@ -1,4 +1,4 @@
-"""A recorded run at any moment: who is where, what burns, what a camera sees."""
+"""A recorded run at any moment: agents, hazards and camera pictures."""
 
 from __future__ import annotations
 
@@ -59,15 +59,15 @@ class Moments:
     # --- who is where ------------------------------------------------------------------
 
     def names(self, *kinds: str) -> list[str]:
-        """Return everybody of some kinds who left a track."""
+        """Return all agents of some kinds that left a track."""
         return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
 
     def within(self, time: float) -> float:
-        """Return the moment [s] to show at `time`: an ended run stays as it was at its end."""
+        """Return the moment [s] to show at `time`: after the end of a run, its last one."""
         return min(time, self.recording.duration)
 
     def is_there(self, name: str, time: float) -> bool:
-        """Return True if an agent is on the site at `time` [s]; tracks of those who leave end."""
+        """Return True if an agent is on the site at `time` [s]: its track ends when it leaves."""
         return time <= self._times[name][-1] + GONE
 
     def past(self, name: str, time: float) -> list[TrackPoint]:
@@ -110,7 +110,7 @@ class Moments:
         return PERSON if robot is None else self.recording.radii[robot]
 
     def glance(self, time: float) -> Glance | None:
-        """Return the newest picture that an operator at the wheel looks at, if there is one."""
+        """Return the newest picture on a driving operator's screen, or None."""
         labels = self.recording.labels
         for drive in self.recording.recorder.drives:
             captured = _shown(drive, time)
@@ -119,7 +119,7 @@ class Moments:
         return None
 
     def eye(self, robot: str, time: float, width: int = 320, height: int = 240) -> Picture:
-        """Return what a robot's camera sees at `time` [s].
+        """Return the picture of a robot's camera at `time` [s].
 
         Raises:
             ConfigError: no such robot.
@@ -159,7 +159,7 @@ class Moments:
 
 
 def _shown(drive: DriveLog, time: float) -> float | None:
-    """Return when the picture that the driver looks at was taken, if there is one."""
+    """Return the time stamp of the picture on the driver's screen, or None."""
     if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
         return None
     frames = [frame for frame in drive.frames if frame.time <= time]

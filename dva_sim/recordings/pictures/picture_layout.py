@@ -29,7 +29,7 @@ TALLEST = 7.5  # maximum height of a map
 
 
 class Sheet:
-    """An empty picture that is as high as what it has to hold.
+    """An empty picture, as high as its maps, heading and key.
 
     Args:
         runs: Runs to show; all at the same place.
@@ -129,7 +129,7 @@ def _size_of_map(recording: Playback, across: float) -> tuple[float, float]:
 
 
 def _add_key(figure: Figure, runs: Sequence[Moments]) -> float:
-    """Return a key below all maps, in as few lines as it fits into; its height."""
+    """Draw a key below all maps, in as few lines as possible; return its height."""
     canvas: Any = figure.canvas
     handles = legend(runs)
     for columns in range(len(handles), 0, -1):

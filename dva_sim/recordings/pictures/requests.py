@@ -73,7 +73,7 @@ class Wanted:
         return self.still is not None and all(other is None for other in options)
 
     def check(self, scenario: Scenario) -> None:
-        """Refuse what no run of a scenario has.
+        """Refuse cameras and moments that no run of a scenario has.
 
         Raises:
             ConfigError: a robot that is not there, or a moment before the run or past its horizon.
@@ -86,7 +86,7 @@ class Wanted:
             raise ConfigError(f"--at {self.at:g} is not within the run, {lasts}")
 
     def write(self, recordings: Sequence[Playback]) -> Iterator[str]:
-        """Write everything, and say of each what it is and where.
+        """Write all requested files, and yield a line for each with its kind and path.
 
         Args:
             recordings: Runs made with `keep_traffic`; a camera is one of the first run.

@@ -30,7 +30,7 @@ class RunVerdict(NamedTuple):
 
     @property
     def full_text(self) -> str:
-        """The words, with the lead if there is one."""
+        """The outcome in words, with the lead if it has one."""
         if self.ahead == math.inf:
             return f"{self.text}, the other not at all"
         return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > TIE_S else self.text

@@ -1,4 +1,4 @@
-"""One run on one map: the site, its hazards, everybody on it, its story, and its outcome."""
+"""One run on one map: the site, hazards, robots and people, the story, and the outcome."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BOLD = 0.68  # upper bound of the mean width of a bold letter [font sizes]
 
 
 class Scene:
-    """A map that can show any moment of a run; a run that has ended stays as it was at its end.
+    """A map that can show any moment of a run; after its end, the last moment.
 
     Args:
         ax: Axes to draw on, with their final size.
@@ -65,7 +65,7 @@ class Scene:
             self._ended.set_fontsize(style.TITLE)
 
     def _draw_ground(self) -> tuple[Any, Any]:
-        """Return the site; the limits of what is seen."""
+        """Draw the site; return the limits of the map."""
         ax = self._ax
         site = self._moments.recording.site
         draw_site(
@@ -92,7 +92,7 @@ class Scene:
         )  # fmt: skip
 
     def show(self, time: float) -> list[Artist]:
-        """Return artists that change, as they are at a moment [s], the lowest first."""
+        """Return the artists that change, updated to a moment [s], the lowest first."""
         now = self._moments.within(time)
         artists = [*self._fields.show(now), *self._upper]
         for body in self._bodies:
@@ -104,7 +104,7 @@ class Scene:
         return [*artists, self._clock, self._below(now)]
 
     def _below(self, time: float) -> Artist:
-        """Return the line below the map: what happened last, or how it ended."""
+        """Return the line below the map: the last fact, or the outcome."""
         ended: Artist = self._ended
         if self._verdict.text and time >= self._verdict.time:
             return ended
@@ -121,7 +121,7 @@ class Scene:
         return float(self._ax.bbox.width * 72 / figure.dpi)
 
     def freeze(self, canvas: Any) -> None:
-        """Draw what stands still as one sheet from now on: the layout is final."""
+        """Draw all fixed artists as one image from now on: the layout is final."""
         renderer = type(canvas.get_renderer())(*canvas.get_width_height(), canvas.figure.dpi)
         for artist in sorted(self._upper, key=lambda artist: artist.get_zorder()):
             artist.draw(renderer)
@@ -147,7 +147,7 @@ class _Sheet:
         return 4.2
 
     def draw(self, renderer: Any) -> None:
-        """Lay it over what is there."""
+        """Draw the layer over the ones below."""
         renderer.draw_image(renderer.new_gc(), 0, 0, self._pixels)
 
 

@@ -51,7 +51,7 @@ def time_of_still(recordings: Sequence[Playback], at: float | None) -> float:
 
 
 def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
-    """Write what a robot's camera sees at a moment [s], twice as large as it is sent.
+    """Write the picture of a robot's camera at a moment [s], twice as large as it is sent.
 
     Raises:
         ConfigError: no such robot.

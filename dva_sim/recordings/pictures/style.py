@@ -59,7 +59,7 @@ HEAT_LEVELS = (1.0, 2.5, 10.0)  # levels of heat flux [kW/m2]; skin bears 2.5 fo
 
 
 def colour_of(kind: str, mode: str) -> str:
-    """Return the colour of somebody who does something."""
+    """Return the colour of an activity."""
     if kind == BYSTANDER and mode == "walking":
         return KINDS[kind]  # green is for guards
     modes = ROBOT_MODES if kind == ROBOT else ACTIVITIES
@@ -105,6 +105,6 @@ def _dot(shape: str, colour: str, label: str, edge: str = "white") -> Any:
 
 
 def _order(mode: str) -> tuple[int, str]:
-    """Return modes as they are listed above, others after them."""
+    """Return the rank of a mode in the legend: in the order above, unlisted ones last."""
     ordered = [*ROBOT_MODES, *ACTIVITIES]
     return (ordered.index(mode) if mode in ordered else len(ordered)), mode

@@ -1,4 +1,4 @@
-"""Devices as the DVA of a run has them in its book: no message tells all of that."""
+"""Devices in the book of a run's DVA, which no message reports completely."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ LOOK = 0.05  # interval of checks whether the drive has begun [s]
 
 
 class Disturbance:
-    """Waits for the first drive, and then ends its permission, or what else the scenario says.
+    """Waits for the first drive, and then disturbs it as the scenario says.
 
     Args:
         dva_of: Function that returns the DVA that grants and revokes permissions for a robot.

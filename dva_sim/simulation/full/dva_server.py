@@ -110,7 +110,7 @@ class DvaAgent:
         clock.every(HEARTBEAT_PERIOD, self._beat, start=clock.now + FIRST_BEAT)
 
     def crash(self) -> None:
-        """Be killed: nothing is said, kept or decided any more, and its memory is put away."""
+        """Die: from now on nothing is sent, kept or decided, and the memory is closed."""
         self.is_gone = True
         self.device.silent = True
         self.device.crash()
@@ -129,7 +129,7 @@ class DvaAgent:
         self._carry_out(self.core.close())
 
     def silence(self, silent: bool) -> None:
-        """Say and decide nothing for a while, though the devices are still heard; or go on."""
+        """Stop sending and deciding for a while, though devices are still heard; or resume."""
         self.device.silent = silent
 
     def dismiss(self, device: str) -> None:
@@ -159,7 +159,7 @@ class DvaAgent:
         self._carry_out(sends)
 
     def keep_requests(self) -> None:
-        """Keep requests from now on, for a reader that is about to come."""
+        """Keep requests from now on, for a reader that will follow."""
         self._requests.want(self.device.clock.now)
 
     def _on_arrival(self, request: Request) -> None:
@@ -244,7 +244,7 @@ class DvaAgent:
         return self._memory is None or not self._problem or self._memory.knows(session)
 
     def _tell_refused(self, source: str, wish: m.Registration, why: str) -> None:
-        """Tell once of each device that is not registered: it asks again and again."""
+        """Report each unregistered device only once, though it asks repeatedly."""
         key = source, wish.address
         if key not in self._turned_away:
             self._turned_away[key] = None

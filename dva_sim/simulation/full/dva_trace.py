@@ -87,17 +87,17 @@ class TracedDva:
         return self._decided(values, lambda: self._core.note(message, now))
 
     def delivered(self, send: Send, now: float, content: Any = None) -> list[Send]:
-        """Return the answered with OK, and with this content."""
+        """Take the answer OK, with its content, to an order."""
         entry = self._about(send, now, m.Reply(1, m.OK, "", content))
         return self._decided(entry, lambda: self._core.delivered(send, now, content))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
-        """Return the answered, but not with OK."""
+        """Take a refusal of a permission."""
         entry = self._about(send, now, reply)
         return self._decided(entry, lambda: self._core.refused_grant(send, reply, now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """Take an order that was not answered."""
+        """Take the news that an order was not answered."""
         return self._decided(
             self._about(send, now, None), lambda: self._core.undelivered(send, now)
         )
@@ -107,7 +107,7 @@ class TracedDva:
         return self._decided({"do": "tick", "now": now}, lambda: self._core.tick(now))
 
     def go_on(self) -> list[Send]:
-        """Go on after a recall."""
+        """Continue after a recall."""
         return self._decided({"do": "go on"}, self._core.go_on)
 
     def dismiss(self, device: str, now: float) -> list[Send]:
@@ -116,7 +116,7 @@ class TracedDva:
         return self._decided(values, lambda: self._core.dismiss(device, now))
 
     def close(self) -> list[Send]:
-        """Return the end."""
+        """End all sessions, as the DVA ends."""
         return self._decided({"do": "close"}, self._core.close)
 
     def check_access(self, now: float) -> None:
@@ -160,7 +160,7 @@ def _nowhere(_: str) -> None:
 
 
 def traced(core: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
-    """Return a core that is written down; see `TracedDva`."""
+    """Return a core whose inputs and decisions are recorded; see `TracedDva`."""
     return cast(Dva, TracedDva(core, sink, stage, memory))
 
 
@@ -191,7 +191,7 @@ class Decided(NamedTuple):
 
 
 def replay_dva(lines: Iterable[str | bytes], path: Path) -> Iterator[Decided]:
-    """Tell a fresh DVA the same again.
+    """Replay the inputs of a trace to a fresh DVA, and yield both decisions on each.
 
     Args:
         lines: Lines of a trace.

@@ -315,7 +315,7 @@ class EventLedger:
     # --- the DVA's table -----------------------------------------------------------------
 
     def check(self, now: float, page: Page) -> Iterator[Broken]:
-        """Yield what is wrong with the event table now."""
+        """Yield the mistakes of the event table now."""
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
         passed = now - self._now
@@ -534,7 +534,7 @@ class EventLedger:
     def _of_event(
         self, event: Event, old: Seen | None, now: float, last: float
     ) -> Iterator[Broken]:
-        """Yield what is wrong with an event; `last` is the time of the last check [s]."""
+        """Yield the mistakes about an event; `last` is the time of the last check [s]."""
         new = self._look(event, old, now)
         rules = self._rules
         for step, when in event.times.items():
@@ -624,7 +624,7 @@ class EventLedger:
         )
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
-        """Return what devices with an event owe; with several orders, they may begin with any."""
+        """Return the next step that the device with an event owes, and since when [s]."""
         word = self._word(event.number)
         device = hands[1] if hands else None
         if device is None or device not in word.taken or self._has_others(device, event.number):

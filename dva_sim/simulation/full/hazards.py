@@ -1,4 +1,4 @@
-"""The hazards of a run: which, where and when, drawn by the run's seed."""
+"""The hazards of a run: kinds, places and times, drawn by the run's seed."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class RunHazard:
         return now >= self.start and not self.false_alarm
 
     def spot(self, now: float) -> HazardSpot:
-        """Return what a camera may see of it at `now` [s], once it has begun."""
+        """Return its visible part at `now` [s], after its beginning."""
         hazard = self.hazard
         x, y = hazard.position
         return make_spot(self.kind, x, y, hazard.radius(now), hazard.shines)

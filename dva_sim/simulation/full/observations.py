@@ -199,7 +199,7 @@ def page_of(dva: DvaAgent) -> Page:
 
 
 class Listener(Protocol):
-    """Takes what is said, in order of time [s]."""
+    """Interface of listeners to messages, in order of time [s]."""
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Take a message or picture that a node has sent; `to` may be empty."""
@@ -209,7 +209,7 @@ class Listener(Protocol):
 
 
 class Observer(Listener, Protocol):
-    """Takes all facts, in order of time [s]."""
+    """Interface of observers of all facts, in order of time [s]."""
 
     def accepted(self, command: Accepted) -> None:
         """Take a command to drive that a robot has accepted."""
@@ -408,7 +408,7 @@ class FactLog:
         return bool(self._motions)
 
     def heard(self, source: str) -> None:
-        """Note that the DVA has heard a device, whatever it said."""
+        """Note that the DVA has received any message of a device."""
         self._heard[source] = None
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:

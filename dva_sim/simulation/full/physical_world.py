@@ -53,7 +53,7 @@ class Field(RunHazards):
         self._others = 0
 
     def populate(self) -> None:
-        """Put everybody in place and let them register."""
+        """Place all agents and let them register."""
         scenario = self.stage.scenario
         team = TeamBuilder(self.stage, self.world, self)
         for number in range(1, scenario.robot.count + 1):
@@ -70,7 +70,7 @@ class Field(RunHazards):
             yield bystander.name, bystander
 
     def schedule_incidents(self) -> None:
-        """Let the hazards break out, and those who notice them report."""
+        """Schedule the hazards, and the reports of agents that notice them."""
         for number, incident in enumerate(self.incidents, 1):
             self._schedule(number, incident)
 
@@ -115,7 +115,7 @@ class Field(RunHazards):
     # --- what happens ------------------------------------------------------------------
 
     def _schedule(self, number: int, incident: RunHazard) -> None:
-        """Schedule detectors that will notice something: they register and report as devices."""
+        """Schedule detectors that will notice a hazard: they register and report as devices."""
         stage = self.stage
         if not incident.false_alarm:
             stage.clock.call_at(
@@ -154,7 +154,7 @@ class Field(RunHazards):
             self._follow(device, incident, body)
 
     def _follow(self, device: AgentDevice, incident: RunHazard, told: m.EventReport) -> None:
-        """Let a detector or caller report again whenever the hazard has become graver."""
+        """Let a detector or caller report again whenever the severity has risen."""
 
         def look() -> bool:
             nonlocal told

@@ -1,4 +1,4 @@
-"""Results of a finished run: what can be shown of it, and all that is measured."""
+"""Results of a finished run, for display and for measures."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class RobotLog(NamedTuple):
 
 
 def log_of(robot: RobotAgent) -> RobotLog:
-    """Return the measures of a robot by now."""
+    """Return the measures of a robot up to now."""
     body = robot.body
     inbox = robot.inbox
     return RobotLog(
@@ -104,7 +104,7 @@ class Ending(NamedTuple):
 
 @dataclass(kw_only=True)
 class Playback:
-    """Everything that can be told and shown of a run, whether or not it ran here.
+    """Displayable results of a run, simulated here or read from a recording.
 
     Attributes:
         recorder: Events and reports of the run.
@@ -154,7 +154,7 @@ class Playback:
 
 @dataclass(kw_only=True)
 class Recording(Playback):
-    """All that is left of one run, to be measured.
+    """All results of one run, to be measured.
 
     Attributes:
         robots: Measures of the robots, by id.

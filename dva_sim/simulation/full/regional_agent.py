@@ -1,4 +1,4 @@
-"""A DVA of regions on the network: its peers, what it passes on, and what it waits for."""
+"""A DVA of regions on the network, with its peers, forwarded reports and pending answers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class RegionalDvaAgent(DvaAgent):
         self._told: m.PeerStatus | None = None
 
     def start(self) -> None:
-        """Begin like any DVA, and register with the others."""
+        """Begin as a single DVA does, and register with the others."""
         super().start()
         clock = self.device.clock
         for peer in self._peers:
@@ -230,7 +230,7 @@ class RegionalDvaAgent(DvaAgent):
             self._replicate(event)
 
     def _replicate(self, event: Event) -> None:
-        """Tell the deputy how an event is now."""
+        """Send the current state of an event to its deputy."""
         replica = self._regional.replica_of(event, self._facts + 1, self.device.clock.now)
         if replica is None:
             return

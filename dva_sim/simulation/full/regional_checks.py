@@ -1,4 +1,4 @@
-"""Safety rules of several DVAs: one is obeyed at a time, nothing dies with one, help comes back.
+"""Safety rules of several DVAs: one is obeyed at a time, none takes events or help with it.
 
 It believes nobody, as `SafetyAudit`, which lets it see the same facts. `CHECKED` says what is held
 against them.
@@ -215,7 +215,7 @@ class RegionalRules:
                 yield "S13", f"{what} and kept, but is not in this book after its death"
 
     def _of_passed_on(self, page: Page, now: float) -> Iterator[Broken]:
-        """Yield events that were let go of and that nobody has."""
+        """Yield events that a DVA has passed on and no DVA has."""
         for number, event in page.events.closed.items():
             by = self._server_of(self.region_at(event.position))
             other = self._pages.get(by or "")
@@ -233,7 +233,7 @@ class RegionalRules:
                     yield "S13", f"has let go of event {number}, which {by} does not have"
 
     def _server_of(self, region: str) -> str | None:
-        """Return the DVA with the highest epoch of a region, as DVAs say of themselves."""
+        """Return the DVA with the highest epoch of a region, by the statuses of DVAs."""
         claims = ((page.served.get(region, 0), page.dva) for page in self._pages.values())
         epoch, dva = max(claims, default=(0, ""))
         return dva if epoch else None
@@ -243,7 +243,7 @@ class RegionalRules:
         return max(self.terms.rules.merge_distance, 0.001)
 
     def _of_others(self, page: Page, now: float) -> Iterator[Broken]:
-        """Yield what two DVAs that hear each other both serve, or look at."""
+        """Yield regions that two DVAs in contact both serve, and events that both handle."""
         lasting: set[tuple[Any, ...]] = set()
         for other in self._pages.values():
             if other.dva <= page.dva or not other.works or not self._hear(page.dva, other.dva, now):

@@ -1,4 +1,4 @@
-"""Build a run from a scenario, let its virtual time pass, and keep what happened.
+"""Build a run from a scenario, let its virtual time pass, and keep its results.
 
 The transport of a scenario's messages, and its demands on a robot's link, are decided here.
 """
@@ -252,7 +252,7 @@ class Run:
         return real.network, stage
 
     def _memories(self, memory: Store | None) -> list[Store | None]:
-        """Return the memory of each DVA; only one that is alone keeps any here."""
+        """Return the memory of each DVA; only a single DVA has one here."""
         return [memory] + [None] * (len(dvas_of(self.scenario)) - 1)
 
     @property
@@ -356,12 +356,12 @@ class Run:
         )
 
     def start_dva(self, memory: Store) -> None:
-        """Start another DVA in place of the one that has crashed, from what that has kept."""
+        """Start another DVA in place of the crashed one, from its memory."""
         self.dva = add_dva(self.stage, None, memory, self._keeps_events)
         self.dva.start()
 
     def _schedule_death(self, order: int, death: DvaDeath) -> None:
-        """End a DVA at its time, and start it again where that is wanted."""
+        """End a DVA at its time, and start it again if the scenario says so."""
         draws = self.stage.streams[f"death-{order}"]
         at_s = float(draws.uniform(death.at_s, max(death.at_s, death.latest_s or 0.0)))
         number = 1 + int(len(self.dvas) * draws.random())
@@ -394,7 +394,7 @@ class Run:
         self.dvas[id_tag].start()
 
     def be_patient(self, scenario: Scenario) -> None:
-        """Let everybody wait for answers as long as another scenario's link needs."""
+        """Set all time-outs to those of another scenario, whose link is different."""
         for device in self.stage.devices:
             device.be_patient(request_timeout_s(scenario))
 

@@ -1,4 +1,4 @@
-"""Audit of the safety rules from outside: it observes what it can instead of trusting messages.
+"""Audit of the safety rules from outside: it observes instead of trusting messages.
 
 It takes the facts of a run (`observations`): the permissions that the DVA really gave, when a robot
 learnt that one is over, and when an emergency reached it; how bodies move, and the set points of
@@ -263,7 +263,7 @@ class Witness:
             self.reported = number
 
     def asks(self, number: int, now: float) -> None:
-        """Note a question to the DVA who holds it, unless it is sent again."""
+        """Note a request to the DVA for the robot's holder, unless it is sent again."""
         if number != self.question:
             self._follows("question", self.last_question, number, now)
             self.question = self.last_question = number
@@ -670,7 +670,7 @@ class SafetyAudit:
         witness.hears(now)
         witness.stood_before = witness.stood
         does = Doing(message.source, message.session, level)
-        if does != witness.does:  # who drives, and starts once more, goes on
+        if does != witness.does:  # a repeated start by the same driver continues the drive
             witness.ends("teleoperation", now)
         witness.does = does
 

@@ -21,7 +21,7 @@ SCENES = 5000
 
 
 def trait_off(scenario: Scenario, trait: str) -> float:
-    """Return how far the first operator is from the population's median in a trait.
+    """Return the deviation of the first operator from the population's median in a trait.
 
     In standard deviations of the trait's logarithm, so that the mean over all persons is zero; zero
     where persons do not differ.
@@ -55,7 +55,7 @@ def way_off(scenario: Scenario, seed: int) -> float | None:
 
 
 def _usual_way(scenario: Scenario, site: Site, planner: Planner) -> float:
-    """Return the mean over many beginnings."""
+    """Return the mean over many starts."""
     seeds = (derive_seed("usual way", number) for number in range(SCENES))
     return math.fsum(_way(scenario, seed, site, planner) for seed in seeds) / SCENES
 

@@ -193,7 +193,7 @@ class Stage:
         self.regions = plan_of(self.scenario.dva.regions, self.site)
         self.robots = robot_profiles(self.scenario)
         self.pattern = load_pattern(self.scenario.pattern, self.scenario.pattern_options)
-        # One map of ways for all: what the largest robot fits through, people and others do.
+        # One roadmap serves all: smaller robots and people fit wherever the largest robot does.
         radius = max((robot.radius_m for robot in self.robots), default=FOOTPRINT)
         self.planner = planner_of(self.site, radius)
         counts = {

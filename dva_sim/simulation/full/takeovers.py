@@ -58,7 +58,7 @@ class Takeovers:
     def given(
         self, rights: Sequence[Right], now: float, works: bool
     ) -> Iterator[tuple[Right, int]]:
-        """Yield rights of those for whom a robot was stopped, with the last holder's session."""
+        """Yield rights of devices for which a robot was stopped, with the last holder's session."""
         before = self._held
         self._held = {right.robot: right for right in rights}
         if not works:  # another DVA knows of no hand-over

@@ -54,7 +54,7 @@ FLAMES_THROUGH = 8.0  # optical depth at which smoke hides glowing things (T. Ji
 
 
 class TeamBuilder:
-    """Makes who takes part, and puts them where they begin.
+    """Makes the robots, guards and bystanders, and places them where they begin.
 
     A robot or guard with a given distance to the event begins on a path to it from elsewhere on
     the site, chosen by the run's seed, at the point where that distance is left.
@@ -150,7 +150,7 @@ class TeamBuilder:
         )
 
     def _look_after(self, robot: RobotAgent) -> None:
-        """Look after power, drive and a wet floor, once a second."""
+        """Update power, motors and friction of the floor, once a second."""
         now = self._stage.clock.now
         body = robot.body
         self._world.advance_to(now)

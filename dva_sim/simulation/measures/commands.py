@@ -74,7 +74,7 @@ def percentiles(name: str, values: Sequence[float] | Floats, which: Iterable[int
 
 
 def ratio(amount: float, of: float) -> float:
-    """Return nan where there is nothing to be a share of."""
+    """Return a share; nan if the whole is 0."""
     return amount / of if of else NAN
 
 

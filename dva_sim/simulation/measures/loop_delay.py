@@ -94,7 +94,7 @@ class Driven(NamedTuple):
 def driven(log: DriveLog, end: float) -> Driven:
     """Return the commands made in a drive that took effect until `end` [s], and for how long.
 
-    Some of the previous drive may still have been under way.
+    Commands of the previous drive that arrive late are left out.
     """
     start = math.inf if log.started is None else log.started
     applied = [a for a in log.applied if a.issued >= start and a.time <= end]

@@ -337,7 +337,7 @@ def _fates(events: Columns, follow: float) -> Row:
 
 
 def _bound(events: Columns, follow: float) -> Row:
-    """Return the bound, as a restricted mean as well, and how often it was none."""
+    """Return the bound, as a restricted mean too, and how often a response came before it."""
     bounds = events["bound_s"]
     response = events["response_s"]
     return {
@@ -347,7 +347,7 @@ def _bound(events: Columns, follow: float) -> Row:
 
 
 def _team(recording: TimedRecording) -> Row:
-    """Return how busy everybody was, and how evenly; `load` is that of the busiest kind of people.
+    """Return the load of the team and its evenness; `load` is that of the busiest kind of people.
 
     Robots do not limit a team that has more of them than operators; people do: guards look and
     contain, operators drive.

@@ -174,7 +174,7 @@ class DriveTrial(Trial[Observation]):
         self.over = ahead.remaining <= RUN_OUT
 
     def _corrected(self, share: float, intent: Intent) -> Intent:
-        """Return the machine helps to steer (pure pursuit); the speed stays the person's."""
+        """Return the command with the machine's help to steer (pure pursuit), at the same speed."""
         at = self.plant
         ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
         turn_rate = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)

@@ -1,4 +1,4 @@
-"""The DVA in a shift: who is registered, and what it may know of the ground.
+"""The DVA in a shift, with its registered devices and its knowledge of the terrain.
 
 Responders are hired as the scenario says, operators drive one robot each at a time, and all are
 registered with the DVA; it knows ways, lists of preference, stations, and where to expect events.
@@ -48,7 +48,7 @@ class Team(ShiftWorld, Protocol):
 def travel(
     shift: Team, starts: Sequence[Start], goals: Sequence[m.Position]
 ) -> tuple[Floats, Floats]:
-    """See `core.travel_times.Travel`: what may be expected of each responder.
+    """See `core.travel_times.Travel`: the expected times of each responder.
 
     Where each way's time is drawn for itself it is known beforehand: choosing by it is the
     point of such a world.

@@ -1,4 +1,4 @@
-"""Demand: what happens, when and where, independent of those who respond."""
+"""Demand: kinds, times and places of events, independent of the responders."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class EventDraws:
         return self._truth[index] >= self._stream.false_share
 
     def severity(self, index: int) -> float:
-        """Return 0 to 1."""
+        """Return the severity of the event, 0 to 1."""
         listed = self._listed(index)
         if listed is not None and listed.severity is not None:
             return listed.severity
@@ -80,7 +80,7 @@ class EventDraws:
         return severity
 
     def confidence(self, index: int) -> float:
-        """Return 0 to 1."""
+        """Return the confidence of the report, 0 to 1."""
         listed = self._listed(index)
         if listed is None or listed.confidence is None:
             return self._stream.confidence
@@ -139,7 +139,7 @@ class Demand:
         self._check()
 
     def _check(self) -> None:
-        """Find out now what would fail later."""
+        """Refuse detectors without a site, and detectors that cannot notice their events."""
         for stream in self._scenario.demand:
             if stream.notice == "detectors":
                 if not isinstance(self._terrain, Rooms):
@@ -147,7 +147,7 @@ class Demand:
                 self._terrain.check_detectors(stream.kind)
 
     def start(self) -> None:
-        """Begin."""
+        """Schedule the first event of each stream."""
         for number, stream in enumerate(self._scenario.demand):
             name = f"demand/{self._names[number]}"
             if stream.between is not None:
@@ -250,7 +250,7 @@ class Demand:
 
 
 def _rate(stream: EventStream) -> float:
-    """Return events per second, as long as nobody is late."""
+    """Return events per second; of finite sources, the rate while all are at rest."""
     if stream.between is not None:
         return 1.0 / stream.between.mean
     if stream.sources is not None:

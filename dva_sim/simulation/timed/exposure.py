@@ -41,7 +41,7 @@ def approach(incident: Incident, start: float, left: float, speed: float, until:
 
 
 def on_scene(incident: Incident, start: float, until: float) -> float:
-    """Return the exposure at the place itself [s]."""
+    """Return the exposure at the place of an incident, between two moments [s]."""
     if not incident.true or until <= start:
         return 0.0
     return max(0.0, min(until, incident.over) - start)

@@ -51,7 +51,7 @@ class Incident:
         self.place.about = self
 
     def danger_radius(self, now: float) -> float:
-        """Within which people should not be [m]; 0 where there is nothing, or no more."""
+        """Radius in which people should not be [m]; 0 if the hazard is not real or has ended."""
         if not self.true or now >= self.over:
             return 0.0
         if self._hazard is None:

@@ -19,7 +19,7 @@ CLOCK_STEP_S = 1e-6  # resolution of the clock: no deadline is checked twice at 
 
 
 class Taker(Protocol):
-    """Somebody the DVA speaks to."""
+    """Receiver of the DVA's messages."""
 
     def take(self, body: m.Body) -> bool:
         """Hear the DVA; False declines."""
@@ -70,7 +70,7 @@ class Mail:
         self._waiting.append((source, body, about))
 
     def publish(self, source: str, body: m.Body) -> None:
-        """Tell the core something that nobody answers."""
+        """Publish a message to the core, which does not answer it."""
         self.core.note(self._message(source, body), self._clock.now)
 
     def carry(self) -> None:
@@ -91,7 +91,7 @@ class Mail:
         self._look_again()
 
     def tick(self) -> None:
-        """Let the core look at what time has brought."""
+        """Let the core check its deadlines."""
         self._moved()
         sends = self.core.tick(self._clock.now)
         self._changed(None)
@@ -117,7 +117,7 @@ class Mail:
         self._changed(None)
 
     def _look_again(self) -> None:
-        """Be there at the next deadline."""
+        """Schedule a tick at the next deadline."""
         due = min(self.core.next_deadline(), self._again)
         if due < self._due:
             self._due = max(due, self._clock.now + CLOCK_STEP_S)

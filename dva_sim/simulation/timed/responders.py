@@ -29,7 +29,7 @@ class ShiftWorld(Protocol):
         """Do something later [s]."""
 
     def say(self, source: str, body: m.Body) -> None:
-        """Say something to the DVA."""
+        """Send a message to the DVA."""
 
     def says_arrived(self, unit: Unit, job: Job) -> None:
         """Tell the DVA that a unit is where it was sent."""
@@ -41,13 +41,13 @@ class ShiftWorld(Protocol):
         """Return the true incident of an event of the DVA."""
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
-        """Return how long this unit takes this time to get ready [s]."""
+        """Return the time that this unit takes to get ready for this incident [s]."""
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
         """Time to get somewhere [s]; infinite if no path exists."""
 
     def look(self, unit: Unit, incident: Incident) -> float:
-        """Return the time from arrival to being sure [s]."""
+        """Return the time from arrival to certainty [s]."""
 
     def act(self, unit: Unit, incident: Incident) -> float:
         """Return how long it takes to contain it [s]."""
@@ -56,7 +56,7 @@ class ShiftWorld(Protocol):
         """Return True if a person will be called to contain it."""
 
     def spent(self, unit: Unit, phase: str, since: float) -> None:
-        """Note that a unit has been at something until now."""
+        """Note that a unit has spent the time since `since` in a phase."""
 
     def freed(self, unit: Unit, job: Job) -> None:
         """Note that a job is over, or broken off."""
@@ -171,7 +171,7 @@ class Unit:
         return False
 
     def order(self, order: m.Order, voice: str) -> bool:
-        """Begin something, or go on with it; what was begun before is dropped."""
+        """Begin an order, or continue it; a job for another event is dropped."""
         world = self.world
         job = self.job
         now = self.world.clock.now
@@ -210,7 +210,7 @@ class Unit:
         return True
 
     def _wait_at(self, place: Place) -> bool:
-        """Go and wait elsewhere, until called."""
+        """Go to another place and wait there for orders."""
         if self.job is not None:
             return False
         self._stop()
@@ -218,7 +218,7 @@ class Unit:
         return True
 
     def _bid(self, offer: m.TaskAnnouncement) -> bool:
-        """Offer to be there as soon as may be expected."""
+        """Bid with the expected time of arrival; False without a bid."""
         if self.job is not None:
             return False
         if len(self._offers) > 64:
@@ -287,7 +287,7 @@ class Unit:
             self._turn_to(job, "stand by")
 
     def _enter(self, job: Job) -> None:
-        """Enter from outside, wherever the growing danger has driven one."""
+        """Enter the danger from its edge, which may have moved outwards meanwhile."""
         self._turn_to(job, "travel")
         goal = job.incident.place
         now = self.world.clock.now
@@ -329,14 +329,14 @@ class Unit:
         self._come_back(job)
 
     def _leave(self) -> None:
-        """Step out of the danger, unless one has been called back to it."""
+        """Leave the danger radius, unless the unit has been called back."""
         near = self._near
         self._near = None
         if near is not None and self.kind == "guard":
             self.world.exposed(self, "leave", leaving(near, self.world.clock.now, self.speed))
 
     def _come_back(self, job: Job) -> None:
-        """Free at once, or when back at base; one who may be needed here is free at once."""
+        """Finish the job now, or at base if units return; units needed here finish now."""
         needed = self.kind == "guard" and self.world.needs_people(job.incident)
         length = self.world.terrain.length(self.place, self.base)
         if self.group.after != "return" or needed or math.isinf(length):
@@ -378,7 +378,7 @@ class Unit:
     # --- waiting ---------------------------------------------------------------------------
 
     def _rest(self) -> None:
-        """Rest where one is, or walk back and listen: nobody calls."""
+        """Wait here, or walk back to base, free for new orders."""
         self._leave()
         if self.group.after == "stay" or self.here() is self.base:
             self.equipped = False
@@ -438,7 +438,7 @@ class Unit:
             self.world.exposed(self, "approach", inside)
 
     def _drop(self) -> float | None:
-        """Break off what one is at; when one would have been ready to set out [s]."""
+        """Break off the current job; return when the unit would have been ready to set out [s]."""
         job = self.job
         self._ticket += 1
         if job is None:
@@ -469,7 +469,7 @@ class Unit:
         self.since = now
 
     def _then(self, delay: float, action: Any, job: Job | None) -> None:
-        """Do something after a while, unless something else comes first."""
+        """Run an action after a delay, unless the unit begins another one first."""
         self._ticket += 1
         if delay <= 0.0:
             action(job)

@@ -15,11 +15,11 @@ from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.simulation import Shift
 
 MAX_EVENTS = 12  # an exact plan for more takes too long
-MAX_UNITS = 4  # likewise
+MAX_UNITS = 4  # an exact plan for more takes too long
 
 
 class _Nobody(Policy):
-    """Lets everything happen, and sends nobody."""
+    """Sends no responder, so that all events happen unhandled."""
 
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> list[Advice]:

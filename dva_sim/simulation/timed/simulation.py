@@ -91,7 +91,7 @@ def _team(shift: Shift) -> Iterator[str]:
 
 
 class Shift:
-    """Everybody in place at time zero.
+    """World of a shift, with all units in place at time zero.
 
     Args:
         seed: Random seed.
@@ -144,7 +144,7 @@ class Shift:
             self.clock.call_at(start, self._begin_shift, on_duty)
 
     def _open_mail(self, policy: Policy) -> Mail:
-        """Return the mail: one decision leads to the next where orders build up, or guards move."""
+        """Return the mail: after a decision it ticks again if one decision can enable the next."""
         containment = self.scenario.dispatch.containment
         attentive = containment or policy.preempts or policy.relocates
         return Mail(self.core, self.clock, self._changed, self._tell_who_moves, attentive)
@@ -324,7 +324,7 @@ class Shift:
         self.demand.closed(incident, now)
 
     def _tell_who_moves(self) -> None:
-        """Tell the DVA before each decision where those are who move and may be called."""
+        """Report the positions of moving, available units to the DVA before each decision."""
         for unit in self._moving:
             self._publish(unit, unit.here(), "walking")
 
@@ -339,7 +339,7 @@ class Shift:
         self.mail.carry()
 
     def say(self, source: str, body: m.Body) -> None:
-        """Say something to the DVA."""
+        """Send a message to the DVA."""
         self.mail.say(source, body)
 
     def says_arrived(self, unit: Unit, job: Job) -> None:
@@ -376,7 +376,7 @@ class Shift:
         return self.events[event][0]
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
-        """Return how long this unit takes this time to get ready [s]."""
+        """Return the time that this unit takes to get ready for this incident [s]."""
         return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.name)
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:

@@ -73,7 +73,7 @@ class SteppedShift:
         return [unit.device for unit in self._shift.units]
 
     def new_events(self) -> list[Event]:
-        """Return events that were reported since this was asked last, as the DVA knows them."""
+        """Return the events reported since the last call, as the DVA knows them."""
         events = self._shift.core.events
         first = self._known + 1
         self._known = events.total

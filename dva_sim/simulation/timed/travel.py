@@ -100,16 +100,16 @@ class Terrain:
         return place
 
     def remember(self, place: Place) -> Place:
-        """Know a place by its position, until it is forgotten; a fixed one is known already."""
+        """Keep a place under its position until it is forgotten; fixed ones are always kept."""
         return self._known.setdefault(place.position, place)
 
     def forget(self, place: Place) -> None:
-        """Forget a place that plays no part any more."""
+        """Forget a place that is no longer used."""
         if self._known.get(place.position) is place and place.fixed is not place:
             del self._known[place.position]
 
     def known_at(self, position: m.Position) -> Place:
-        """Return the place that a message speaks of."""
+        """Return the place at the position in a message."""
         place = self._known.get(position)
         if place is None:
             x, y = self.frame.to_xy(position.latitude, position.longitude)
@@ -133,7 +133,7 @@ class Terrain:
         return place
 
     def apart(self, place: Place) -> Place:
-        """Return the place under a position of its own."""
+        """Return a copy of the place under a unique position."""
         self._numbered = self._numbered % NUMBERED + 1
         at = place.position
         position = m.Position(at.latitude + self._apart * self._numbered, at.longitude)
@@ -312,7 +312,7 @@ class _Ways:
         return length
 
     def path(self, a: Point, b: Point) -> Floats | None:
-        """Return the path itself, since positions under way are queried repeatedly."""
+        """Return the path, cached as positions along it are queried repeatedly."""
         if (a, b) not in self._paths:
             if len(self._paths) >= MAX_PATHS:
                 self._paths.clear()
@@ -357,7 +357,7 @@ def _passages_of(site: Site) -> tuple[Point, ...]:
 
 @lru_cache(maxsize=4096)
 def _detected_after(site: Site, kind: str, point: Point) -> float:
-    """Return events happen at the same few spots again and again: once per process."""
+    """Return the time to the first detection [s]; cached, as events recur at a few spots."""
     return min(FOUND, first_detection(make_hazard(kind, point, 0.0), site)[1])
 
 

@@ -102,7 +102,7 @@ class Floors:
         return self._colours.take(index, mode="clip")
 
     def _floor(self, site: Site) -> Bytes:
-        """Return tiles in a tint of each room's colour, so that one sees oneself move."""
+        """Return tiles in a tint of each room's colour; the joints show how the robot moves."""
         colours = self._tints(site)[self._rooms.numbers]
         rows, columns = self._rooms.numbers.shape
         x = self._rooms.origin[0] + (np.arange(columns) + 0.5) * self._rooms.cell
@@ -167,7 +167,7 @@ class Floors:
 
 
 def _coarser(colours: Bytes, times: int) -> Bytes:
-    """Return blocks of cells in one."""
+    """Return the mean colour of each block of `times` by `times` cells."""
     rows = colours.shape[0] // times
     columns = colours.shape[1] // times
     blocks = colours.reshape(rows, times, columns, times, 3).mean(axis=(1, 3))

@@ -126,7 +126,7 @@ class Camera:
     # --- what stands still -------------------------------------------------------------
 
     def _draw_walls(self, walls: Hits, pose: Pose, *canvases: Any) -> None:
-        """Draw one wall for each column, over what is there."""
+        """Draw the nearest wall of each column over the picture."""
         top, bottom = self._edges(walls)
         first = max(0, math.floor(top.min()))
         last = min(self.height, math.ceil(bottom.max()))
@@ -224,7 +224,7 @@ class Camera:
         things: Sequence[Figure | Hazard],
         time: float,
     ) -> None:
-        """Add everything that stands about, the farthest first."""
+        """Draw people, robots, flames and bottles, the farthest first."""
         cos = math.cos(pose.heading)
         sin = math.sin(pose.heading)
         gaps = [(x - pose.x, y - pose.y) for x, y in map(_place_of, things)]
@@ -279,7 +279,7 @@ def _develop(colours: Any, light: Floats) -> Floats:
 
 
 def _pixels(start: float, size: float, count: int, texels: int) -> tuple[slice, Any]:
-    """Return which of `count` pixels a length covers, and the texel that each of them shows."""
+    """Return the pixels, of `count`, that a length covers, and the texel that each shows."""
     first = min(count, max(0, round(start)))
     last = max(0, min(count, round(start + size)))
     last = max(first, last)

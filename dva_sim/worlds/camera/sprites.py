@@ -1,4 +1,4 @@
-"""Upright pictures of what stands before a camera: people, robots, flames, gas bottles.
+"""Upright pictures of objects before a camera: people, robots, flames, gas bottles.
 
 Each is drawn once per process. Which picture a hazard has, its own class says.
 """
@@ -63,10 +63,10 @@ def view_of(heading: float, bearing: float) -> str:
 
 @cache
 def person(view: str, number: int, guard: bool) -> Sprite:
-    """Return somebody who stands or walks, 1.75 m tall.
+    """Return a standing or walking person, 1.75 m tall.
 
     Args:
-        view: `front`, `back`, `left` or `right`: the side that is seen of somebody who faces
+        view: `front`, `back`, `left` or `right`: the visible side of a person who faces
             the lens, turns the back on it, or looks to the left or right of the picture.
         number: Chooses clothes, skin and hair.
         guard: In uniform.
@@ -88,7 +88,7 @@ def person(view: str, number: int, guard: bool) -> Sprite:
 
 @cache
 def lying(number: int, guard: bool) -> Sprite:
-    """Return somebody who lies on the floor."""
+    """Return a person who lies on the floor."""
     up = person("right", number, guard)
     turned = np.ascontiguousarray(np.rot90(up.colours, axes=(1, 2)))
     return Sprite(turned, np.ascontiguousarray(np.rot90(up.cover)), (up.size[1], up.size[0] * 0.8))
@@ -124,7 +124,7 @@ def robot(view: str) -> Sprite:
 
 @cache
 def bottle() -> Sprite:
-    """Return a leaking gas bottle, and what comes out of it."""
+    """Return a leaking gas bottle and its cloud."""
     pen = _Pen(1.0, 1.6)
     for number in range(9):
         x = 0.05 + 0.042 * number
@@ -269,7 +269,7 @@ class _Pen:
 
 
 class Figure(NamedTuple):
-    """Somebody or something that moves, as a camera may see it.
+    """A person or an object that moves, as a camera may see it.
 
     Attributes:
         kind: `robot`, `guard` or `bystander`.

@@ -1,4 +1,4 @@
-"""Upright surfaces of a site, and which of them a camera's columns of pixels meet.
+"""Upright surfaces of a site, and those that each column of a camera's pixels meets.
 
 One ray for each column is enough: walls are upright, so all pixels of a column that show the
 same surface are equally far away.
@@ -48,7 +48,7 @@ class Hits(NamedTuple):
     along: Floats
 
     def where(self, choice: NDArray[Any]) -> Hits:
-        """Return some of them, by mask or by index."""
+        """Return a selection of the entries, by mask or by index."""
         return Hits(*(values[choice] for values in self))
 
 
@@ -110,7 +110,7 @@ class Surfaces:
         return places.astype(np.float32)
 
     def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
-        """Return what the columns meet: the nearest wall of each, and what stands before it.
+        """Return the nearest wall of each column, and the surfaces before it.
 
         Args:
             pose: Pose of the lens [m, rad].

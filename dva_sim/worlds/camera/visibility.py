@@ -67,7 +67,7 @@ class SmokeView(NamedTuple):
 def add_smoke(
     scene: Floats, depth: Floats, rays: Rays, fall: Floats, smoke: SmokeView, heights: Any
 ) -> None:
-    """Let smoke hide what is behind it: exp(-K d) of its contrast is left after d metres in it.
+    """Reduce contrast behind smoke: exp(-K d) of it is left after d metres of smoke.
 
     A column takes the layer to hang equally low everywhere along its ray. Two columns share the
     air that they look through, two rows what is left of the contrast.
@@ -129,7 +129,7 @@ def _in_the_layer(depth: Floats, fall: Floats, heights: Any, share: Floats) -> F
 
 
 def add_firelight(scene: Floats, gap2: Floats, lit: Any, strength: float) -> None:
-    """Warm light of a fire on what is around it.
+    """Warm light of a fire on its surroundings.
 
     Args:
         scene: Red, green, blue `(3, h, w)`, changed in place.
@@ -145,7 +145,7 @@ def add_firelight(scene: Floats, gap2: Floats, lit: Any, strength: float) -> Non
 
 
 def add_water(scene: Floats, water: Floats, base: Floats, grazing: Floats, time: float) -> None:
-    """Let wet floor mirror what stands behind it.
+    """Let wet floor mirror the wall and the objects behind it.
 
     A level mirror at the foot of an upright wall shows it upside down in its own column.
 

@@ -1,4 +1,4 @@
-"""A site as air and water see it: spaces, what joins them, and which space is where."""
+"""A site for air and water: spaces, the openings between them, and the space of each place."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Building:
 
 
 class SitePoints:
-    """Points of a picture, and what lies there.
+    """Points of a picture, and their grid cells and spaces.
 
     Args:
         building: Building of the points.
@@ -102,7 +102,7 @@ class SitePoints:
 
 
 def building_of(site: Site) -> Building:
-    """Return the building that a site is; copies of a site share what is worked out."""
+    """Return the building of a site; copies of a site share it."""
     return site.kept("building", lambda: _building(site))
 
 

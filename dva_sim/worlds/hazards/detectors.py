@@ -45,7 +45,7 @@ DOSE = 60.0 * _AT_50 * (50.0 - HARMLESS) ** POWER  # dose at the alarm [ppm^POWE
 
 
 class CoAlarm:
-    """A domestic carbon monoxide alarm: it sums up what is above 30 ppm, and forgets below.
+    """A domestic carbon monoxide alarm: it sums up exposure above 30 ppm, and forgets it below.
 
     Its three parameters follow from the alarm times that EN 50291 prescribes: it keeps them by
     construction. How fast it forgets is assumed: as fast as it learns.

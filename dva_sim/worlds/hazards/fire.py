@@ -272,7 +272,7 @@ SMOKE_PACES = ((math.inf, 1.0),)  # longest step, as layers would oscillate in l
 
 
 class Layer(NamedTuple):
-    """Smoke under a ceiling: lower face and thickness [m], [deg C], [1/m], [ppm]."""
+    """Smoke layer under a ceiling: lower face and thickness [m], [deg C], [1/m], CO [ppm]."""
 
     bottom: float
     depth: float
@@ -462,13 +462,13 @@ class FireField(SolvedField):
 
 
 def _radiant(radiated: float, distance: float, radius: float) -> float:
-    """Radiant heat so far from the middle of flames that have a radius [m], in [kW/m^2]."""
+    """Radiant heat at a distance [m] from the middle of flames with a radius [m], in [kW/m^2]."""
     distance = max(distance, radius, 0.1)
     return float(radiated / (4.0 * math.pi * distance * distance))
 
 
 def _glow(temperature: float, optical_depth: float) -> float:
-    """Return the radiant heat of hot smoke on somebody below or in it [kW/m^2]."""
+    """Return the radiant heat of hot smoke on a person below or in it [kW/m^2]."""
     if temperature < AMBIENT + 1.0:
         return 0.0
     kelvin = temperature + KELVIN - AMBIENT

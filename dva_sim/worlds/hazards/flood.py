@@ -110,7 +110,7 @@ class Filling:
         self._levels = 1.0 / (1.0 / a + 1.0 / b)  # volume per difference of levels [m^2]
 
     def dry(self) -> Floats:
-        """Return the water in each space and, last, what has run out [m^3]."""
+        """Return the water in each space and, last, the water that has run out [m^3]."""
         return np.zeros(self._spaces.count + 1)
 
     def step(self, state: Floats, age: float, dt: float) -> Floats:

@@ -61,7 +61,7 @@ class Air:
         self._solvers: dict[float, Any] = {}
 
     def still(self) -> Floats:
-        """Clean air: the share in every node and, last, what was carried out [m^3]."""
+        """Clean air: the share of gas in every node and, last, the gas carried out [m^3]."""
         return np.zeros(len(self.mesh.area) + 1)
 
     def step(self, state: Floats, node: int, rate: float, dt: float) -> Floats:

@@ -260,7 +260,7 @@ class LeakField(SolvedField):
         return alarm_in(detector, lambda age: self._air_with(share(age)))
 
     def _outdoors(self, x: float, y: float, time: float) -> float:
-        """Return the plume: what is there was set free when the wind set out from the leak."""
+        """Return the plume: gas at a place was released as long ago as the wind takes to it."""
         leak = self._leak
         if self._indoors or self.building.space_at(x, y) != NO_SPACE:
             return 0.0

@@ -90,7 +90,7 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Refuse a class of which nobody could be told.
+        """Refuse a class that no message could report.
 
         Raises:
             TypeError: `reported_as` or `shows` has a word that nobody knows.
@@ -150,11 +150,11 @@ class HazardField:
         self.until = math.inf
 
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """Return what it adds to clear air at a place [m]; nothing up to its start."""
+        """Return the conditions that it adds to clear air at a place [m]; none up to its start."""
         raise NotImplementedError
 
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
-        """Return a raster of what it adds, such as `water`; None if it adds nothing of the kind.
+        """Return a raster of a quantity that it adds, such as `water`; None if it adds none.
 
         Args:
             what: One of `QUANTITIES`; or `layer`, smoke as it is where it is thickest between
@@ -249,7 +249,7 @@ class SolvedField(HazardField):
         self._states: tuple[Floats, Floats, float]
 
     def solve(self) -> tuple[March, Step]:
-        """Return the states with the source, shared from age 0 on; and the step without it."""
+        """Return the states with the source, shared from age 0 on, and the step without it."""
         raise NotImplementedError
 
     @cached_property
@@ -300,7 +300,7 @@ def first_detection(hazard: Hazard, site: Site) -> tuple[Detector | None, float]
 def _first(
     hazard: Hazard, detectors: Sequence[Detector], site: Site
 ) -> tuple[Detector | None, float]:
-    """Return all detectors are asked at growing ages until one sounds."""
+    """Return the first detector that sounds, and when [s]; all are asked at growing ages."""
     best: tuple[Detector | None, float] = None, math.inf
     if not detectors:
         return best

@@ -84,7 +84,7 @@ class SmokeLayers:
         self._slice = DISCHARGE * spaces.width[:, None] * spaces.top[:, None] / SLICES
 
     def empty(self) -> Floats:
-        """Clean air: a row for each space and, last, what has left; columns as above."""
+        """Clean air: a row for each space and, last, the smoke that has left; columns as above."""
         return np.zeros((self._spaces.count + 1, 4))
 
     def step(self, state: Floats, age: float, dt: float) -> Floats:
@@ -114,14 +114,14 @@ class SmokeLayers:
         return self._ceiling - np.minimum(depth, self._ceiling), kelvin
 
     def _risen(self, heat: float, bottom: float) -> Floats:
-        """Return what the plume adds to the fire room's layer each second."""
+        """Return the mass, heat, soot and CO that the plume adds to the layer each second."""
         convective = (1.0 - RADIATIVE_FRACTION) * heat
         fuel = heat / HEAT_OF_COMBUSTION
         air = plume(convective, max(LOWEST, bottom))
         return np.array([air + fuel, convective, SOOT_YIELD * fuel, CO_YIELD * fuel])
 
     def _spilt(self, state: Floats, bottom: Floats, kelvin: Floats, dt: float) -> Floats:
-        """Return what flows through doors in a step."""
+        """Return the flow through doors in a step."""
         spaces = self._spaces
         change = np.zeros_like(state)
         low = np.minimum(bottom[spaces.a], bottom[spaces.b])
@@ -175,7 +175,7 @@ class SmokeLayers:
         return out, (flow * heights).sum(axis=2) / np.maximum(out, 1e-12)
 
     def _overflow(self, state: Floats) -> None:
-        """Push what a space cannot hold to where there is room, or out through cracks."""
+        """Push smoke from full spaces into neighbours with room, or out through cracks."""
         room = self._area[:-1] * self._ceiling[:-1]
         volume = volumes(state[:-1])
         full = np.append(volume > room, False)

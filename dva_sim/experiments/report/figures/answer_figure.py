@@ -35,7 +35,7 @@ class AnswerFigure(style.ReportFigure):
     title = "The declared contrast"
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         if view.contrast is None or reading.worded_finding is None:
             return None
         return self.contrast(

@@ -31,7 +31,7 @@ class CommandAge(style.ReportFigure):
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         columns = [f"command_age_{q}_s" for q in _QUANTILES]
         if not all(view.part.has(column) for column in columns):
             return None
@@ -97,7 +97,7 @@ class Brought(style.ReportFigure):
     pages = ("transport",)
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         measures = [each for each in SHOWN if view.part.has(each.column)]
         if not measures:
             return None

@@ -49,7 +49,7 @@ class DelayBudget(style.ReportFigure):
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         grids = stages_of(view)
         if not grids:
             return None
@@ -141,7 +141,7 @@ _NAME = 24  # characters of a stop's name in a line
 
 
 class Stacks:
-    """Bars lie, so that names of any length stand beside them.
+    """Stacked bars, horizontal so that names of any length fit beside them.
 
     Args:
         label: Label of the axis along the bars.

@@ -35,7 +35,7 @@ class Distributions(style.ReportFigure):
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         panels = view.shown
         figure, axes = style.panels(
             len(panels), 1, 2.7 if len(panels) < 3 else 2.2, sharex=True, sharey=True

@@ -45,7 +45,7 @@ class Differences(style.ReportFigure):
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         if view.contrast is None or view.series_factor is None:
             return None
         findings = cadences(view, reading.scenario_of(view.part.name))

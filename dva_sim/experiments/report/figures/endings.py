@@ -41,7 +41,7 @@ class EndingsInTime(style.ReportFigure):
     tables = ("runs", "events")
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         endings = reading.endings
         if endings is None:
             return None

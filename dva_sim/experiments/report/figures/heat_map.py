@@ -70,7 +70,7 @@ class HeatMap(style.ReportFigure):
     pages = ("driving",)
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         fields = _fields(view)
         if not fields or view.over is None or view.series_factor is None or view.contrast is None:
             return None

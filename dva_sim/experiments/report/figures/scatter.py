@@ -105,7 +105,7 @@ class Scatter(style.ReportFigure):
         return super().applies(view, reading) and bool(reading.points)
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw a panel for each varied range, with a dot for each point of the design."""
         clouds, names, where, panel = points_of(view, reading)
         ranges = (reading.study.get("design") or {}).get("ranges") or {}
         abreast = min(_PANELS_A_ROW, len(names))

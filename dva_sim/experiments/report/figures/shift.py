@@ -52,7 +52,7 @@ class Trade(ShiftFigure):
     title = "The trade: how soon somebody is there, against how long people stand in danger"
 
     def drawn(self, shifts: Shifts) -> Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         if not shifts.can_spare:
             return None
         label = "Exposure of people in finding out what it is [s per event]"
@@ -138,7 +138,7 @@ class WayToBest(ShiftFigure):
     title = "How much of what can be gained in response each policy gains"
 
     def drawn(self, shifts: Shifts) -> Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         if shifts.target is None or not shifts.travellers:
             return None
         names = shifts.travellers

@@ -38,7 +38,7 @@ class TradeOff(style.ReportFigure):
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
+        """Draw the figure."""
         measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
         responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
         columns = (measured[0], responses[0]) if measured and responses else None
