@@ -7,7 +7,7 @@ from dva_sim.network.connections import Connector, Load, ZeromqConfig, is_calm
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
-from dva_sim.simulation.full.run import load_of
+from dva_sim.simulation.full.run import compute_load
 
 LOAD = Load(rate_bps=1e6, burst=20_000)
 
@@ -59,7 +59,7 @@ def test_what_is_chosen_by_hand_is_taken():
 
 def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link():
     """10 pictures of 12,000 bytes and 30 messages a second, on 20 Mbit/s."""
-    load = load_of(scenarios.build({}))
+    load = compute_load(scenarios.build({}))
     assert load.rate_bps == 8 * (10 * (12_000 + 9 * 52) + 30 * 1000)
     assert load.rate_bps / LinkConfig().rate_bps < 1 / 12
     assert load.burst == 22_468

@@ -11,7 +11,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import middleware, task, timed, transports
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.run_journal import recording_of
+from dva_sim.simulation.full.run_journal import compute_recording
 from dva_sim.simulation.models import model_of
 from dva_sim.simulation.scenario import build, load
 
@@ -232,7 +232,7 @@ def real_link(changed):
 
 
 def journal(*lines):
-    recording_of(build(load("drive-to-event"), {}), 1, lines)
+    compute_recording(build(load("drive-to-event"), {}), 1, lines)
 
 
 FIRE = {"site": {"name": "tiny.yaml"}, "events": [{"kind": "fire", "reported": True}]}

@@ -34,7 +34,7 @@ from dva_sim.experiments.results.tables import write_tables
 from dva_sim.experiments.study.cell_grid import runs_in
 from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
 from dva_sim.simulation.full.dva_trace import OWN_CODE
-from dva_sim.simulation.full.run_journal import JournalLine, recording_of
+from dva_sim.simulation.full.run_journal import JournalLine, compute_recording
 from dva_sim.simulation.measures import episodes
 from dva_sim.simulation.measures.drives import command_rows, drive_rows
 from dva_sim.simulation.measures.reported import reported_rows
@@ -275,7 +275,7 @@ def _tables(
     if not lines:
         return {}, {}, 0.0
     try:
-        recording = recording_of(scenario, seed, lines)
+        recording = compute_recording(scenario, seed, lines)
     except ValueError as error:
         raise ConfigError(f"contains no lines of a run: {error}", folder / KEPT_RUN) from None
     tables: Tables = {}

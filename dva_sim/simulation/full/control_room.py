@@ -39,7 +39,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.regional_agent import RegionalDvaAgent
-from dva_sim.simulation.full.stage import Stage, control_rooms_of, id_of, middle_of
+from dva_sim.simulation.full.stage import Stage, control_rooms_of, find_clearest_place, id_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
@@ -231,7 +231,7 @@ def _patrols(stage: Stage) -> Patrols:
     for patrol in stage.scenario.patrols:
         if patrol.robot not in stage.labels.values():
             raise ConfigError(f"patrols: there is no {patrol.robot!r}; robots: robot-1 and on")
-        places = [middle_of(site, p) if isinstance(p, str) else p for p in patrol.places]
+        places = [find_clearest_place(site, p) if isinstance(p, str) else p for p in patrol.places]
         for x, y in places:
             if not site.is_free(x, y, FOOTPRINT):
                 raise ConfigError(f"patrols: no robot fits at x {x:g} m, y {y:g} m")

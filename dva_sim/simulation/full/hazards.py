@@ -82,7 +82,7 @@ def draw_incidents(
 
 
 def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunHazard:
-    start, (x, y) = beginning_of(event, site, streams, number)
+    start, (x, y) = draw_beginning(event, site, streams, number)
     hazard = make_hazard(event.kind, (x, y), start, **event.hazard)
     room = site.room_at(x, y) or ""
     detector = None
@@ -103,7 +103,7 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
     )
 
 
-def beginning_of(
+def draw_beginning(
     event: EventConfig, site: Site, streams: Streams, number: int
 ) -> tuple[float, tuple[float, float]]:
     """Return when [s] and where [m] an event begins.

@@ -63,7 +63,7 @@ MESSAGE = 1000  # upper bound of the size of a message other than a picture, wit
 COINCIDING_MESSAGES = 10  # messages that may coincide with a picture; assumed
 
 
-def load_of(scenario: Scenario) -> Load:
+def compute_load(scenario: Scenario) -> Load:
     """Return the greatest load of a robot's link, in the busier direction."""
     frame = scenario.camera.frame_bytes
     picture = frame + -(-frame // MSS) * HEADERS
@@ -171,7 +171,7 @@ class Run:
         self.recorder = watched.recorder
         self._observers: tuple[Observer, ...] = ()  # the audit first, once all are in place
         self._connector = Connector(
-            scenario.transport, scenario.network_depth, scenario.zeromq, load_of(scenario)
+            scenario.transport, scenario.network_depth, scenario.zeromq, compute_load(scenario)
         )
         self.network, self.stage = self._connected(seed, watched)
         check_partitions(scenario.link.partitions, self.stage.labels.values())

@@ -169,7 +169,7 @@ class RunJournal:
         return values | {"handling": handling}
 
 
-def recording_of(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) -> Recording:
+def compute_recording(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) -> Recording:
     """Compute a recording of a run from its journal.
 
     Args:

@@ -10,7 +10,7 @@ import math
 
 from dva_sim.agents.population import draw_person
 from dva_sim.kernel.streams import Streams, derive_seed
-from dva_sim.simulation.full.hazards import beginning_of
+from dva_sim.simulation.full.hazards import draw_beginning
 from dva_sim.simulation.full.stage import planner_of
 from dva_sim.simulation.scenario import Scenario, population, robot_profiles, site_of
 from dva_sim.worlds.planning import Planner
@@ -62,5 +62,5 @@ def _usual_way(scenario: Scenario, site: Site, planner: Planner) -> float:
 
 def _way(scenario: Scenario, seed: int, site: Site, planner: Planner) -> float:
     base = site.robot_bases[0]
-    _, place = beginning_of(scenario.events[0], site, Streams(seed), 1)
+    _, place = draw_beginning(scenario.events[0], site, Streams(seed), 1)
     return planner.cost((base.x, base.y), place)

@@ -244,7 +244,7 @@ class Stage:
         """Return the ids of the DVAs that serve a region in turn, its own first."""
         assert self.regions is not None, "one DVA serves everything"
         numbers = {name: number for number, name in enumerate(self.regions.names, 1)}
-        return tuple(id_of("dva", numbers[name]) for name in self.regions.line_of(region))
+        return tuple(id_of("dva", numbers[name]) for name in self.regions.serving_order(region))
 
     def _dvas_known_to(
         self, kind: str, number: int, at: tuple[float, float] | None
@@ -326,7 +326,7 @@ def planner_of(site: Site, radius: float) -> Planner:
     return Planner(site, radius)
 
 
-def middle_of(site: Site, room: str) -> tuple[float, float]:
+def find_clearest_place(site: Site, room: str) -> tuple[float, float]:
     """Return the place in a room that is farthest from everything [m].
 
     Raises:

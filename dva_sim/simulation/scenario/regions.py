@@ -43,7 +43,7 @@ class RegionPlan:
         """Return how far from a region a place [m] is [m]; 0 inside."""
         return float(shapely.distance(self.areas[region], shapely.Point(x, y)))
 
-    def line_of(self, region: str) -> tuple[str, ...]:
+    def serving_order(self, region: str) -> tuple[str, ...]:
         """Return the regions whose DVAs serve a region in turn: its own, its deputy's, others'."""
         first = region, self.deputies[region]
         return *first, *(name for name in self.areas if name not in first)

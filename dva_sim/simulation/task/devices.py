@@ -23,7 +23,7 @@ from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
 from dva_sim.agents.tilt.filters import load_guarded_filter
 from dva_sim.agents.tilt.hand import MAX_SPEED, Hand
 from dva_sim.kernel.streams import Streams
-from dva_sim.simulation.task.plants import Pair, clamped, keep_of, noise_of, shaken
+from dva_sim.simulation.task.plants import Pair, clamped, draw_motor_noise, remaining_share, shaken
 from dva_sim.simulation.task.scenario import DeviceConfig
 
 HAND_SPEED = 1.0  # highest speed of a hand that moves a mouse [m/s]; assumed
@@ -88,8 +88,8 @@ class Mouse(HandDevice):
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         super().__init__(config, config.rate_hz)
         self.top = HAND_SPEED * config.gain
-        self._keep = keep_of(person.hand_lag, dt)
-        self._noise = noise_of(person, streams, dt)
+        self._keep = remaining_share(person.hand_lag, dt)
+        self._noise = draw_motor_noise(person, streams, dt)
         self._velocity = self._place = (0.0, 0.0)
 
     @override
@@ -115,8 +115,8 @@ class Joystick(HandDevice):
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         super().__init__(config, config.rate_hz)
         self.top = config.gain
-        self._keep = keep_of(person.hand_lag, dt)
-        self._noise = noise_of(person, streams, dt)
+        self._keep = remaining_share(person.hand_lag, dt)
+        self._noise = draw_motor_noise(person, streams, dt)
         self._hand = self._shown = (0.0, 0.0)
         self._most = 0.0
 

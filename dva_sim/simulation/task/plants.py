@@ -17,14 +17,14 @@ from dva_sim.simulation.task.delays import slow_noise
 Pair = tuple[float, float]
 
 
-def keep_of(lag: float, dt: float) -> float:
+def remaining_share(lag: float, dt: float) -> float:
     """Return the share of a first-order lag [s] that a step [s] leaves."""
     return math.exp(-dt / lag) if lag > 0.0 else 0.0
 
 
-def noise_of(person: Person, streams: Streams, dt: float) -> Iterator[Pair]:
+def draw_motor_noise(person: Person, streams: Streams, dt: float) -> Iterator[Pair]:
     """Yield the motor noise of a trial, as a share of what the hand does, step by step."""
-    keep = keep_of(person.hand_lag, dt)
+    keep = remaining_share(person.hand_lag, dt)
     share = person.motor_noise
     first, second = (slow_noise(streams.fresh(f"hand/{axis}"), keep) for axis in "xy")
     for x, y in zip(first, second, strict=True):

@@ -33,11 +33,11 @@ def oracle_for(scenario: TimedScenario, seed: int) -> OraclePolicy:
         ConfigError: the run is not of the small kind that can be solved exactly.
     """
     shift, incidents = _foresee(scenario, seed)
-    plan = solve(instance_of(shift, incidents))
+    plan = solve(make_instance(shift, incidents))
     return OraclePolicy(plan, [unit.device for unit in shift.units])
 
 
-def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
+def make_instance(shift: Shift, incidents: list[Incident]) -> Instance:
     """Convert a run's random draws to an instance for the solver."""
     arrival = np.array(
         [

@@ -120,7 +120,7 @@ class SessionRecording(NamedTuple):
 def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording:
     """Return the network first, and then one drive over what it delivers."""
     contest = play(scenario, seed)
-    trials = task.play(scenario.task(), seed, recording_of(scenario, contest))
+    trials = task.play(scenario.task(), seed, make_recorded_delays(scenario, contest))
     failures = sum(trial["plugin_failures"] for trial in trials)  # while practising, too
     return SessionRecording(scenario, contest, trials[-1] | {"plugin_failures": failures})
 
@@ -134,7 +134,7 @@ def rehearse(scenario: TransportScenario) -> None:
     task.rehearse(scenario.task())
 
 
-def recording_of(scenario: TransportScenario, contest: Contest) -> RecordedDelays:
+def make_recorded_delays(scenario: TransportScenario, contest: Contest) -> RecordedDelays:
     """Return the delays of commands and pictures while the session was measured."""
     return RecordedDelays(
         _stream(contest, contest.commands, scenario.commands.rate_hz),

@@ -7,7 +7,7 @@ import pytest
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.simulation.full.run import Run, Watched
-from dva_sim.simulation.full.run_journal import RunJournal, recording_of
+from dva_sim.simulation.full.run_journal import RunJournal, compute_recording
 from dva_sim.simulation.measures.drives import command_rows, drive_rows
 from dva_sim.simulation.measures.episodes import tables_of
 from dva_sim.simulation.scenario import build, load
@@ -49,7 +49,7 @@ def test_tables_from_the_journal_are_those_of_the_run(name, until, changes):
     whole = Run(scenario, 3, watched=Watched(Clock(), Recorder()))
     whole.clock.run(until)
     expected = whole.recording()
-    found = recording_of(scenario, 3, journaled(scenario, 3, until))
+    found = compute_recording(scenario, 3, journaled(scenario, 3, until))
     assert plain(tables_of(found)) == plain(tables_of(expected))
     for rows in (drive_rows, command_rows):
         assert plain(rows(found)) == plain(rows(expected))

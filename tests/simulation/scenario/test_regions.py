@@ -40,7 +40,7 @@ def test_the_deputy_is_the_next_region_or_the_one_that_is_named():
     third = {"polygon": [[50, 0], [60, 0], [60, 40], [50, 40]]}
     divided = plan(west=WEST, middle=REST, east=third | {"deputy": "middle"})
     assert divided.deputies == {"west": "middle", "middle": "east", "east": "middle"}
-    assert divided.line_of("east") == ("east", "middle", "west")
+    assert divided.serving_order("east") == ("east", "middle", "west")
 
 
 @pytest.mark.parametrize(
