@@ -64,7 +64,7 @@ class Handovers:
     # --- who has it --------------------------------------------------------------------
 
     def holder(self, robot: str, asker: str, now: float) -> m.Holder | None:
-        """Return who else holds a robot, serves an order with it, or waits for it."""
+        """Return another device that holds a robot, serves an order with it, or waits for it."""
         handover = self.under_way.get(robot)
         if handover is not None and robot in self.sessions.reserved and handover.asker != asker:
             return self._named(handover.asker, 0.0)

@@ -31,10 +31,7 @@ def as_number(text: str) -> float:
 
 
 def capital(text: str) -> str:
-    """Return a capital letter first, unless that is of a name such as `min_eta`.
-
-    Others as they are.
-    """
+    """Return a text with a capital first letter, unless it begins with a name such as `min_eta`."""
     return text if "_" in text.partition(" ")[0] else text[:1].upper() + text[1:]
 
 

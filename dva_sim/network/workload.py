@@ -26,7 +26,7 @@ from dva_sim.network.messaging import CommandSockets, Requester, RequestTranspor
 OPERATOR: Final = "operator"
 ROBOT: Final = "robot"
 UNBOUNDED: Final = 1 << 30  # a queue, buffer, number of attempts or time [s] that nothing fills
-_JUST_BEFORE_S: Final = 1e-9  # a step so near to the end is none
+_JUST_BEFORE_S: Final = 1e-9  # a step this close to the end counts as the end [s]
 
 
 class NoteKind(IntEnum):

@@ -43,7 +43,7 @@ _MODE = f"({'|'.join(choices('Mode'))})"
 
 
 def _real(whole: str, sign: str = "-?") -> str:
-    """Return a number with these digits before the point, or one below 10 with an exponent."""
+    """Return a pattern of numbers: with `whole` before the point, or with an exponent."""
     small = r"[0-9](?:\.[0-9]{1,17})?e-[0-9]{2,3}"
     return rf"({sign}(?:{whole}\.[0-9]{{1,22}}|{small}))"
 

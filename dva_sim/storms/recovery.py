@@ -111,7 +111,7 @@ class RecoveryProbes:
         return min(late, begins + PROBES_LAST) + PROBES_LAST
 
     def end(self) -> None:
-        """Report what has not recovered."""
+        """Report the devices that have not recovered."""
         for device, when in self._beats.items():
             if self._clock.now - when > BEATS_WITHIN:
                 text = f"has not heard the heartbeat of {self._stage.labels[device]}"

@@ -212,7 +212,7 @@ class Storm(StormScene):
 
 
 class _Witness:
-    """Observer that passes on what a storm has to know; see `Observer`."""
+    """Observer that passes messages, commands and motion on to the storm; see `Observer`."""
 
     def __init__(self, storm: Storm) -> None:
         self.sent = storm.sent

@@ -615,7 +615,7 @@ class RobotAgent:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
     def move(self, set_point: TimedSetPoint) -> None:
-        """Give the motors a set point that was decided on."""
+        """Pass a set point on to the motors."""
         self.set_point = set_point
         if self._guarded is not None and self.controller.mode is TELEOPERATION:
             self._guarded.take(set_point)

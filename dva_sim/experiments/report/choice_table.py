@@ -75,7 +75,7 @@ def _by_choice(choice_map: ChoiceMap) -> _Lines:
 def beside_table(choice_map: ChoiceMap, part: str) -> CellTable:
     """Return a row for each situation and choice.
 
-    The loss itself, and what else a drive is like.
+    It has the loss, and the other measures of a drive.
     """
     heads = [
         factor_name(choice_map.given.name),

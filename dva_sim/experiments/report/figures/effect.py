@@ -203,7 +203,7 @@ def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
 
 
 def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
-    """Return one line with its band and bars; gives the height of its end."""
+    """Draw one series with its band and bars; return the height of its last point."""
     x = _places(bands, shift)
     colour = look.colour
     ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)

@@ -38,7 +38,7 @@ class ShiftFigure(ReportFigure):
 
     @abstractmethod
     def drawn(self, shifts: Shifts) -> Drawn | None:
-        """Return the figure; None where there is nothing to be seen."""
+        """Return the figure; None if it would be empty."""
 
 
 def _looks(shifts: Shifts) -> dict[Level, Look]:
