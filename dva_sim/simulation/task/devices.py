@@ -209,7 +209,7 @@ class TiltPosition(Tilt):
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         super().__init__(config, person, streams, dt)
         self.top = self._gain * MAX_SPEED
-        self._noise = noise_of(person, streams, dt)
+        self._noise = draw_motor_noise(person, streams, dt)
         self._rate = 0.0, 0.0
 
     @override
