@@ -60,18 +60,28 @@ def scenario_of(options: LiveOptions) -> Scenario:
     return scenario
 
 
-def addresses_of(options: LiveOptions) -> list[str]:
+def addresses_of(options: LiveOptions | ConsoleOptions) -> list[str]:
     """Return the addresses of the DVAs, in the order of their regions; none if none is given."""
     return [] if options.dva is None else [each.strip() for each in options.dva.split(",")]
 
 
-def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
-    """Refuse what several DVAs cannot do over sockets, and addresses that are not one for each."""
+def check_count(options: LiveOptions | ConsoleOptions, scenario: Scenario) -> int:
+    """Return the number of DVAs of a scenario, if addresses are given for all, or none.
+
+    Raises:
+        ConfigError: they are not one for each region.
+    """
     addresses = len(addresses_of(options))
     count = max(1, len(scenario.dva.regions))
     if addresses not in (0, count):
         has = f"{count} regions" if scenario.dva.regions else "one DVA"
         raise ConfigError(f"--dva names {addresses} addresses, and the scenario has {has}")
+    return count
+
+
+def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
+    """Refuse what several DVAs cannot do over sockets, and addresses that are not one for each."""
+    count = check_count(options, scenario)
     if scenario.dva.deaths:
         raise ConfigError("dva.deaths: only in virtual time; end the process of a DVA instead")
     if scenario.dva.backbone is not None:

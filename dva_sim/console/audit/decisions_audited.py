@@ -7,7 +7,7 @@ decisions there is the record alone. Where nobody answers, the outcome is `unkno
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol, Unpack
@@ -77,6 +77,7 @@ class DecisionAudit(Audited):
         system: System of the DVA.
         author: Name of the person at a page.
         room: Function that returns the id of the control room of a page's person, if there is one.
+        others: Ids of the console's control rooms by which people decide in other regions.
     """
 
     def __init__(
@@ -85,10 +86,12 @@ class DecisionAudit(Audited):
         system: DecidingSystem,
         author: Callable[[str], str],
         room: Callable[[str], str | None],
+        others: Collection[str] = (),
     ) -> None:
         super().__init__(keeper, author, system.named)
         self._system = system
         self._room = room
+        self._others = others
         self._rooms: set[str | None] = set()  # control rooms by which people have decided here
         self._asked: dict[str, AskedDecision] = {}  # by the id of the action
 
@@ -119,7 +122,8 @@ class DecisionAudit(Audited):
     def heard(self, record: m.AuditRecord) -> None:
         """Take the DVA's record of a decision."""
         for number, decision in self._asked.items():
-            if decision.matches(record) and record.author == self._room(decision.client):
+            rooms = self._room(decision.client), *self._others
+            if decision.matches(record) and record.author in rooms:
                 decision.record = record
                 self._finish(number)
                 return

@@ -183,7 +183,8 @@ class ConsolePages:
     def keep_audit(self, keeper: AuditKeeper) -> None:
         """Keep what people do, and what the DVA decides, from now on."""
         rooms = self.rooms
-        self.audited = DecisionAudit(keeper, self.system, self.author, rooms.room_of)
+        others = [room.device.id_tag for room in self.system.agent.rooms[1:]]
+        self.audited = DecisionAudit(keeper, self.system, self.author, rooms.room_of, others)
 
     def hear_record(self, record: m.AuditRecord) -> None:
         """Keep a decision, and note who takes a robot from its driver, whom the DVA names not."""
@@ -242,6 +243,7 @@ class ConsolePages:
                 "robots": robots,
                 "people": self.people(),
                 "order": self.seat_lines.waiting_order(),
+                "regions": self.system.regions.rows(self.clock.now),
             }
         )
         self._tell_alarms(robots)
@@ -288,7 +290,16 @@ class ConsolePages:
 
     def _conditions(self) -> Iterator[AlarmCondition]:
         """Yield the conditions of the system itself that need somebody to act."""
-        if self.system.is_silent:
+        for row in self.system.regions.rows(self.clock.now):
+            if row["state"] != "served":
+                yield AlarmCondition(
+                    f"region {row['name']}",
+                    kind="region not served",
+                    priority="critical" if row["state"] == "dead" else "high",
+                    place="",
+                    text=f"Region {row['name']}: {row['text']}",
+                )
+        if self.system.is_silent and not self.system.regions.own:
             text = f"The DVA at {self.system.dva} is silent"
             yield AlarmCondition("dva silent", "DVA silent", "critical", place="", text=text)
         if self.lag.held_for > LAG_ALARM:
@@ -355,7 +366,7 @@ class ConsolePages:
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
 
     def devices(self) -> list[DeviceRow]:
-        """Return a row for each device that the DVA lists."""
+        """Return a row for each device that a DVA lists."""
         system = self.system
         return [
             listed_device_row(

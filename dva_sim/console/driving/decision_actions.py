@@ -25,6 +25,7 @@ from dva_sim.console.events.decisions import (
 )
 from dva_sim.console.events.handing_over import HandingOver
 from dva_sim.console.events.missions import SentRobots
+from dva_sim.console.system.site_control_room import SiteControlRoom
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     FindingAsked,
@@ -49,7 +50,7 @@ class DecidingRooms(Protocol):
         handing_over: Work that people offer to each other.
     """
 
-    listener: ControlRoomAgent
+    listener: SiteControlRoom
     handing_over: HandingOver
 
     def names(self) -> Mapping[str, str]:
@@ -114,7 +115,10 @@ class DecisionActions:
         self._rooms.decide(client, _role(line), on_result, partial(self._ask, body, done))
 
     def _ask(self, body: m.Body, done: str, agent: ControlRoomAgent, on_result: OnResult) -> None:
+        agent = self._rooms.listener.about(getattr(body, "event_id", 0), agent)
         agent.raised = None
+        for room in self._rooms.listener.rooms[1:] if isinstance(body, m.SetDispatch) else ():
+            room.ask(body)
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
@@ -156,6 +160,7 @@ class DecisionActions:
         seen_decisions = status.decisions if decisions is None else decisions
 
         def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            agent = self._rooms.listener.about(status.event_id, agent)
             mission = self.sent.send(client, agent, robot, status)
             mission.begin(line.get("reason") or None, seen_decisions, on_result)
 
@@ -174,7 +179,7 @@ class DecisionActions:
         label = self._system.label_of(robot)
 
         def revoke(agent: ControlRoomAgent, on_result: OnResult) -> None:
-            revoke_permission(robot, label, agent.ask, on_result)
+            revoke_permission(robot, label, self._at(robot, agent).ask, on_result)
 
         self._rooms.decide(client, _role(line), on_result, revoke)
 
@@ -188,9 +193,16 @@ class DecisionActions:
         labels = {robot: self._system.label_of(robot) for robot in robots}
 
         def release(agent: ControlRoomAgent, on_result: OnResult) -> None:
-            release_robots(robots, labels, agent.ask, on_result)
+            def ask(body: m.Body, *callbacks: Any) -> None:
+                self._at(getattr(body, "device", ""), agent).ask(body, *callbacks)
+
+            release_robots(robots, labels, ask, on_result)
 
         self._rooms.decide(client, _role(line), on_result, release)
+
+    def _at(self, robot: str, agent: ControlRoomAgent) -> ControlRoomAgent:
+        """Return the console's control room at the DVA of a robot, if `agent` is not there."""
+        return self._rooms.listener.at(self._system.system.dva_of(robot), agent)
 
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
@@ -203,7 +215,7 @@ class DecisionActions:
         def begin(agent: ControlRoomAgent, on_result: OnResult) -> None:
             self._driving.take_over(
                 client,
-                agent=agent,
+                agent=self._at(robot, agent),
                 robot=robot,
                 reason=line["reason"],
                 event=event,

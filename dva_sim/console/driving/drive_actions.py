@@ -7,7 +7,7 @@ be taken, of any origin: a seat knows it by its messages.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Protocol, Unpack
 
@@ -40,6 +40,8 @@ from dva_sim.network.patterns import PATTERNS
 from dva_sim.protocol import messages as m
 
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
+TURNED_WITHIN = 10.0  # a DVA has registered a seat by then, or does not answer [s]
+ONE_REGION = "one person drives in one region at a time: give back what you have in the other"
 
 
 class Handhelds(Protocol):
@@ -114,14 +116,43 @@ class Driving:
 
         holders = self._holders(robots, person)
 
-        def answered(ok: bool, text: str) -> None:
+        def answered(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if not ok and not person.robots:
                 self.leave(client)
             self.hold()
-            on_result(ok, text if ok or not holders else f"{text}. {holders}")
+            on_result(ok, text if ok or not holders else f"{text}. {holders}", **more)
 
         self._system.introduce(person.device, robots)
-        person.take(robots, answered, line.get("level", "teleoperation"))
+        take = partial(person.take, robots, answered, line.get("level", "teleoperation"))
+        self.turn(person, robots, take, answered)
+
+    def turn(
+        self,
+        person: PersonAgent,
+        robots: Sequence[str],
+        then: Callable[[], object],
+        on_result: OnResult,
+    ) -> None:
+        """Call `then` once a person is registered with the DVA of the first of some robots.
+
+        Who has something to do at another DVA stays there, and is refused.
+        """
+        device = person.device
+        dva = next(filter(None, map(self._system.system.dva_of, robots)), device.dva)
+        ends = device.clock.now + TURNED_WITHIN
+
+        def looks_again() -> bool:
+            if device.dva == dva:
+                then()
+            elif device.clock.now >= ends:
+                unanswered(on_result)
+            return device.dva != dva and device.clock.now < ends
+
+        if dva != device.dva and (person.robots or person.order is not None):
+            on_result(False, ONE_REGION)
+        elif looks_again():
+            device.turn_to(dva)
+            device.clock.every(LOOK, looks_again)
 
     def _sit(self, client: str, rather: int | None = None) -> int:
         """Return the number of a page's seat, which has a person from then on.
@@ -397,7 +428,7 @@ class Driving:
                 seat.attended = client in self._seating.client_of.values()
             on_result(ok, text, **more)
 
-        Takeover(
+        takeover = Takeover(
             agent=agent,
             robot=robot,
             reason=reason,
@@ -405,7 +436,8 @@ class Driving:
             seat=seat.device.id_tag,
             take=take,
             on_result=ended,
-        ).begin()
+        )
+        self.turn(seat, [robot], takeover.begin, ended)
 
     # --- orders ----------------------------------------------------------------------------
 

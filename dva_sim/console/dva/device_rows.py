@@ -44,6 +44,7 @@ def device_row(
     beats_hz: float,
     holder: str | None,
     holder_label: str | None,
+    dva: str | None,
     is_fake: bool = False,
 ) -> DeviceRow:
     """Return what any console can show of a device; all else is unknown."""
@@ -57,6 +58,7 @@ def device_row(
         "heard_s": _rounded(heard_s, 1),
         "silent": silent,
         "beats_hz": round(beats_hz, 2),
+        "dva": dva,
         "link": link_of(heard_s or 0.0, silent) if speaks else None,
         "fake": is_fake,
         "round_trip_s": None,
@@ -94,6 +96,7 @@ def listed_device_row(
         beats_hz=device_state.rate.of(device_state.beats, now),
         holder=None if holder is None else holder.holder,
         holder_label=holder_named(holder, labels) or "",
+        dva=labels.get(device_state.dva),
         is_fake=is_fake,
     )
     row["holder_known"] = holder is not None or device.device_type != ROBOT
@@ -122,9 +125,16 @@ class DeviceRows:
         Args:
             fakes: Ids of those that were added by hand.
         """
-        return [self._row(booked, fakes) for booked in self._bench.devices.rows()]
+        obeyed = {device.id_tag: device.dva for device in self._run.stage.devices}
+        rows = {  # of a device that has left a DVA, only from the book of the next
+            booked.device.id_tag: self._row(booked, fakes, dva)
+            for dva, table in self._bench.devices.items()
+            for booked in table.rows()
+            if obeyed.get(booked.device.id_tag, dva) in (dva, booked.device.id_tag)
+        }
+        return list(rows.values())
 
-    def _row(self, booked: BookedDevice, fakes: Collection[str]) -> DeviceRow:
+    def _row(self, booked: BookedDevice, fakes: Collection[str], dva: str) -> DeviceRow:
         id_tag = booked.device.id_tag
         robot = self._run.field.robots.get(id_tag)
         grant = booked.grant
@@ -137,6 +147,7 @@ class DeviceRows:
             beats_hz=booked.beats_hz,
             holder=None if grant is None else grant.holder,
             holder_label=None if grant is None else booked.holder_label,
+            dva=None if id_tag in self._run.dvas else self._run.stage.labels[dva],
             is_fake=id_tag in fakes,
         )
         row["round_trip_s"] = self._round_trip(id_tag)

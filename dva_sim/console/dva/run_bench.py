@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 from dva_sim.agents.device import do_nothing
@@ -15,7 +16,6 @@ from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.simulation.full.device_table import DeviceTable
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import DVA
 
 
 class RunBench:
@@ -29,7 +29,7 @@ class RunBench:
 
     Attributes:
         port: Port of the DVA.
-        devices: Devices in the DVA's book.
+        devices: Devices in the book of each DVA, by its id.
         is_modelled: True if its links are modelled, and no real sockets.
     """
 
@@ -42,7 +42,7 @@ class RunBench:
     ) -> None:
         network = cast(VirtualNetwork, run.network) if sockets is None else sockets.network
         self._run = run
-        self.devices = DeviceTable(lambda: run.dva)
+        self.devices = {dva: DeviceTable(partial(run.dvas.__getitem__, dva)) for dva in run.dvas}
         self.port = DvaPort(lambda: run.dva, network, address)
         self.is_modelled = sockets is None
         self._moved = moved
@@ -77,16 +77,19 @@ class RunBench:
         self, room: str, role: ControlRoomRole, then: Callable[[], object] = do_nothing
     ) -> None:
         """Implement `Bench`."""
-        self._run.dva.core.roles.appoint(room, role)
+        for dva in self._run.dvas.values():
+            dva.core.roles.appoint(room, role)
         then()
 
     def forget(self, device: str, then: Callable[[], object] = do_nothing) -> None:
         """Implement `Bench`."""
-        self._run.dva.dismiss(device)
+        for dva in self._run.dvas.values():
+            dva.dismiss(device)
         then()
 
     # --- what no message tells or asks for -------------------------------------------------
 
     def is_registered(self, device: str) -> bool:
-        """Return True if an id is that of the DVA, or stands in its book."""
-        return device == DVA or device in self._run.dva.core.registry.entries
+        """Return True if an id is that of a DVA, or stands in the book of one."""
+        books = (dva.core.registry.entries for dva in self._run.dvas.values())
+        return device in self._run.dvas or any(device in book for book in books)

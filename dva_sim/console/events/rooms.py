@@ -14,6 +14,7 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import OnResult, unanswered
 from dva_sim.console.events.handing_over import HandingOver
+from dva_sim.console.system.site_control_room import SiteControlRoom
 from dva_sim.console.wire.events import RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
@@ -21,7 +22,8 @@ from dva_sim.kernel.labels import with_id
 from dva_sim.protocol.devices import FORGET_AFTER, ControlRoomRole
 from dva_sim.simulation.full.run import Run
 
-LISTENER: Final = 1000  # number of the device that listens for the pages; a scenario's are below
+LISTENER: Final = 1000  # number of the device that listens for the pages; those at the DVAs of
+# other regions are just below, and a scenario's far below
 MAX_ROOMS: Final = 250
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of one until its id is given out again [s]
 JOINED_WITHIN: Final = 30.0  # a person is told by then whether the DVA knows the device [s]
@@ -88,12 +90,21 @@ class ConsoleRooms:
         self.users: dict[str, str] = {}
         self.handing_over = HandingOver()
         self._used: set[int] = set()
-        self.listener = self._agent(LISTENER, "console")
+        self.listener = SiteControlRoom(*map(self._listening, range(len(run.dvas))))
 
-    def _agent(self, number: int, label: str) -> ControlRoomAgent:
+    def _listening(self, order: int) -> AgentDevice:
+        """Return the device of the listener at one of the DVAs; at the first it knows all."""
+        device = self._device(LISTENER - order, "console")
+        if order:
+            device.dvas = (list(self._run.dvas)[order],)
+            device.dva = device.dvas[0]
+            device.call(f"console at {self._run.stage.labels[device.dva]}")
+        return device
+
+    def _device(self, number: int, label: str) -> AgentDevice:
         device = self._run.stage.device("control-room", number)
         device.call(label)
-        return ControlRoomAgent(device)
+        return device
 
     # --- who decides ------------------------------------------------------------------------
 
@@ -151,7 +162,7 @@ class ConsoleRooms:
         if number is None:
             return None
         self._used.add(number)
-        agent = self._agent(LISTENER + number, name or f"{role}-{number}")
+        agent = ControlRoomAgent(self._device(LISTENER + number, name or f"{role}-{number}"))
         self._appoint(agent.device.id_tag, ControlRoomRole(role))
         return ConsoleRoom(number, agent, role)
 
@@ -159,12 +170,13 @@ class ConsoleRooms:
         """Let the DVA count on exactly those whose pages are open.
 
         Args:
-            pages: Role of each open page, by client. The console's own room has the highest, so
-                that the DVA knows of people who have decided nothing yet.
+            pages: Role of each open page, by client. The console's own rooms have the highest, so
+                that DVAs know of people who have decided nothing yet.
         """
         roles = {ControlRoomRole(role) for role in pages.values() if role}
         highest = max(roles, key=list(ControlRoomRole).index, default=ControlRoomRole.LOOK)
-        self._appoint(self.listener.device.id_tag, highest)
+        for listening in self.listener.rooms:
+            self._appoint(listening.device.id_tag, highest)
         for client, room in self.by_client.items():
             if client not in pages:
                 room.device.withdrawn = True
@@ -189,7 +201,7 @@ class ConsoleRooms:
         clock.call_after(RESTS, self._forget, room)
 
     def _forget(self, room: ConsoleRoom) -> None:
-        for peer in (room.device.dva, *self._run.field.robots):
+        for peer in (*room.device.dvas, *self._run.field.robots):
             room.device.forget(peer)
         self._run.stage.dismiss(room.device)
         self._appoint(room.device.id_tag, ControlRoomRole.LOOK)

@@ -25,7 +25,7 @@ from dva_sim.network.realtime import PacedClock
 from dva_sim.protocol.devices import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
 from dva_sim.recordings.motion import MotionWriter
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import DVA, address_of
+from dva_sim.simulation.full.stage import address_of
 from dva_sim.simulation.scenario import PhoneConfig, phone_profile
 
 DVA_PORT: Final = 5555  # at which the modelled DVA is said to listen
@@ -145,7 +145,8 @@ class Phones:
         device = self._run.stage.device("phone", number)
         device.call(label)
         device.device_type = TYPES[kind]
-        device.dva = DVA if address == self.address else NOBODY
+        device.dvas = device.dvas if address == self.address else (NOBODY,)
+        device.dva = device.dvas[0]
         seat.person = PersonAgent(device, self._console(), seat.new_tilt)
         seat.person.sit_down()
         return FIRST_OF_PHONES + number
@@ -156,7 +157,7 @@ class Phones:
         self._clock.call_after(RESTS, self._forget, number - FIRST_OF_PHONES, device)
 
     def _forget(self, number: int, device: AgentDevice) -> None:
-        for peer in (DVA, NOBODY, *self._run.field.robots):
+        for peer in (*device.dvas, *self._run.field.robots):
             device.forget(peer)
         self._run.stage.dismiss(device)
         self._used.discard(number)

@@ -12,7 +12,7 @@ from typing import Any, Final
 from dva_sim.agents.device import do_nothing
 from dva_sim.cameras.children import PipedChild
 from dva_sim.console.bench import UNATTENDED
-from dva_sim.console.remote.options import own_id
+from dva_sim.console.remote.options import own_ids
 from dva_sim.console.remote.piped_bench import PLAIN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.dva_port import DvaPort
@@ -54,7 +54,7 @@ class PageBeside:
         """Start the page's process; without a key it is not served, and a line says so."""
         keys = self._options.keys
         try:
-            own = own_id(None if keys is None else KeyRing(keys))
+            (own,) = own_ids(None if keys is None else KeyRing(keys))
         except ConfigError as error:
             self._say(f"no page: {error}")
             return

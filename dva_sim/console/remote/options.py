@@ -12,7 +12,7 @@ from dva_sim.console.asking.seats import MAX_SEATS
 from dva_sim.console.audit.audit_keeper import check_target
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.options import changes_of
+from dva_sim.live.options import addresses_of, changes_of, check_count
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.sockets import split_address
@@ -25,11 +25,11 @@ SEAT = "console"
 FIRST_FREE = 1001  # numbers of control rooms that no scenario gives, for who has no key
 
 
-def listening_address(dva: str) -> str:
-    """Return the address at which the DVA finds the console's own device."""
+def listening_address(dvas: str) -> str:
+    """Return the address at which the first of some DVAs finds the console's own device."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
         try:
-            way.connect(split_address(dva))  # nothing is sent by that
+            way.connect(split_address(dvas.split(",")[0]))  # nothing is sent by that
         except OSError:
             return "127.0.0.1"
         return str(way.getsockname()[0])
@@ -39,8 +39,8 @@ def check(options: ConsoleOptions) -> None:
     """Check the options before anything starts.
 
     Raises:
-        ConfigError: something is asked for that is of a console's own run, the address is none, or
-            no audit log can be kept where it is wanted.
+        ConfigError: something is asked for that is of a console's own run, an address is none, it
+            is not one for each region, or no audit log can be kept where it is wanted.
     """
     own = {
         "--links": options.links != "modelled",
@@ -54,7 +54,9 @@ def check(options: ConsoleOptions) -> None:
     for name, is_given in own.items():
         if is_given:
             raise ConfigError(f"{name} is not for --dva: what is shown runs elsewhere")
-    check_address(str(options.dva), "--dva ")
+    for address in addresses_of(options):
+        check_address(address, "--dva ")
+    check_count(options, scenario_shown(options) or Scenario())
     if options.audit is not None:
         check_target(options.audit)
 
@@ -70,19 +72,21 @@ def scenario_shown(options: ConsoleOptions) -> Scenario | None:
     return build(load(options.scenario), parse_changes(changes_of(options)))
 
 
-def own_id(ring: KeyRing | None) -> str:
-    """Return the id of the console's own device: that of a key, or a random one.
+def own_ids(ring: KeyRing | None, count: int = 1) -> list[str]:
+    """Return the ids of the console's own devices, one for each DVA: those of keys, or random ones.
 
     Raises:
-        ConfigError: there is no secret key of a control room.
+        ConfigError: there are too few secret keys of control rooms.
     """
     if ring is None:
-        return id_of(ROOM, FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE))
-    if own := _with_secret(ring, ROOM):
-        return own[0]
+        first = FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE - count)
+        return [id_of(ROOM, first + number) for number in range(count)]
+    own = _with_secret(ring, ROOM)
+    if len(own) >= count:
+        return own[:count]
+    more = f"dva-sim keys {ring.folder} {ROOM}-{len(own) + 1}"
     raise ConfigError(
-        f"no secret key of a control room; make one: dva-sim keys {ring.folder} {ROOM}-1",
-        ring.folder,
+        f"no secret key of a control room for each DVA; make one: {more}", ring.folder
     )
 
 

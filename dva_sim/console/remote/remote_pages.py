@@ -6,7 +6,6 @@ from typing import Final
 
 from typing_extensions import override
 
-from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.console.asking.refusal import Refused
@@ -23,6 +22,8 @@ from dva_sim.console.remote.options import scenario_shown
 from dva_sim.console.remote.remote_scene import LINK, remote_scene
 from dva_sim.console.system.known_system import SOMEWHERE, KnownSystem
 from dva_sim.console.system.request_reader import LOG, RequestReader
+from dva_sim.console.system.served_regions import regions_of
+from dva_sim.console.system.site_control_room import SiteControlRoom
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.rows import ServerShown
 from dva_sim.console.wire.scenes import LinkShown, SceneLine
@@ -31,8 +32,8 @@ from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import CONTROL_ROOM, OPERATOR
 from dva_sim.simulation.full.control_room import setup_by
-from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.simulation.scenario import Scenario, phone_profile, site_of
+from dva_sim.simulation.full.stage import DVA, dvas_of, id_of
+from dva_sim.simulation.scenario import Scenario, phone_profile, plan_of, site_of
 
 FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
 SPEAKS_NO_MORE: Final = "speaks no more: the DVA takes it from its list within some seconds"
@@ -69,16 +70,31 @@ class RemotePages(ConsolePages):
         self._has_keys = options.keys is not None
         self._links = links
         site = None if named is None else site_of(named, 1)
+        self._plan = None if site is None else plan_of(scenario.dva.regions, site)
         frame = site.frame if site is not None else SOMEWHERE
         own = links.device(
             links.own, "control room", CONTROL_ROOM, address=links.address, frame=frame
         )
+        dvas = dvas_of(scenario)
+        links.labels.update(dvas if len(dvas) > 1 else {})
+        others = [
+            links.device(
+                id_tag,
+                f"control room at {dvas[dva]}",
+                CONTROL_ROOM,
+                address=links.join(id_tag),
+                frame=frame,
+                dvas=(dva,),
+            )
+            for id_tag, dva in zip(links.others, links.dvas[1:], strict=True)
+        ]
         system = KnownSystem(
-            ControlRoomAgent(own),
+            SiteControlRoom(own, *others),
             clock=links.clock,
             recorder=links.recorder,
             dva=str(options.dva),
             labels=links.labels,
+            regions=regions_of(scenario),
             site=site,
             bench=bench,
         )
@@ -99,7 +115,8 @@ class RemotePages(ConsolePages):
 
     def close(self) -> None:
         """Take part no more."""
-        self.system.device.leave()
+        for room in self.system.agent.rooms:
+            room.device.leave()
         self._links.close()
 
     # --- see `ConsolePages` ----------------------------------------------------------------
@@ -126,6 +143,7 @@ class RemotePages(ConsolePages):
             own_pattern=self.driven.own_pattern,
             site=system.site,
             frame=system.frame,
+            regions=self._plan,
         )
         if system.bench is not None:
             scene["begins_at"] = "main"

@@ -7,6 +7,7 @@ from typing import Final
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.scene import RULES, legend, patterns_of, site_of
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingShown
+from dva_sim.simulation.scenario.regions import RegionPlan
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
@@ -15,7 +16,12 @@ DEFAULT_REACH_M: Final = 40.0  # half-width of a map without a site [m]
 
 
 def remote_scene(
-    things: list[ThingShown], address: str, own_pattern: str, site: Site | None, frame: GeoFrame
+    things: list[ThingShown],
+    address: str,
+    own_pattern: str,
+    site: Site | None,
+    frame: GeoFrame,
+    regions: RegionPlan | None,
 ) -> SceneLine:
     """Return the first line that a page gets."""
     return {
@@ -25,7 +31,7 @@ def remote_scene(
         "title": f"What runs at the DVA at {address}",
         "seed": None,
         "attached": True,
-        "site": site_of(site) if site is not None else nowhere(frame),
+        "site": site_of(site, regions) if site is not None else nowhere(frame),
         "things": things,
         "patterns": patterns_of(own_pattern),
         "link": LINK,
@@ -52,4 +58,5 @@ def nowhere(frame: GeoFrame) -> SiteShown:
         "solids_m": [],
         "doors_m": [],
         "exits_m": [],
+        "regions": [],
     }

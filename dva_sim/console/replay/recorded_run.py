@@ -45,26 +45,27 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.facts import Fact
 from dva_sim.recordings.event_moments import ROUNDED, statuses_at
 from dva_sim.recordings.reading import Opened, RecordedHazard
-from dva_sim.simulation.full.stage import DVA
-from dva_sim.simulation.scenario import robot_profiles
+from dva_sim.simulation.full.stage import dvas_of
+from dva_sim.simulation.scenario import plan_of, robot_profiles
 
 BEATING = 10.0  # over which heartbeats are counted [s]
 
 
 class RecordedDevices:
-    """Devices registered at the DVA, and the times at which each was heard.
+    """Devices registered at the DVAs, and the times at which each was heard.
 
     Args:
         traffic: All messages of a run, by time.
-        dva: Id of the DVA.
+        dvas: Labels of the DVAs, by id.
     """
 
-    def __init__(self, traffic: Iterable[Sent], dva: str) -> None:
-        self._registered: dict[str, tuple[float, m.Registration]] = {}
+    def __init__(self, traffic: Iterable[Sent], dvas: Mapping[str, str]) -> None:
+        self._dvas = dvas
+        self._registered: dict[str, list[tuple[float, str, m.Registration]]] = {}  # time, DVA
         self._heard: dict[str, list[float]] = {}
         self._beats: dict[str, list[float]] = {}
         for sent in traffic:
-            if sent.destination == dva and isinstance(sent.payload, bytes):
+            if sent.destination in dvas and isinstance(sent.payload, bytes):
                 self._take(sent)
 
     def _take(self, sent: Sent) -> None:
@@ -73,13 +74,13 @@ class RecordedDevices:
         self._heard.setdefault(who, []).append(sent.time)
         if b"<HBMsg>" in data:
             self._beats.setdefault(who, []).append(sent.time)
-        elif b"<RegMsg>" in data and who not in self._registered:
+        elif b"<RegMsg>" in data:
             try:
                 body = decode(data).body
             except ProtocolError:
                 return
             if isinstance(body, m.Registration):
-                self._registered[who] = sent.time, body
+                self._registered.setdefault(who, []).append((sent.time, sent.destination, body))
 
     def rows(
         self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]
@@ -91,15 +92,17 @@ class RecordedDevices:
             robots: State of robots, by id.
             doing: Activities of the people and robots on site, by label.
         """
+        past = {who: [r for r in each if r[0] <= now] for who, each in self._registered.items()}
         return [
-            self._row(who, about, now, robots.get(who), doing)
-            for who, (when, about) in self._registered.items()
-            if when <= now
+            self._row(who, *each[-1][1:], now, robots.get(who), doing)
+            for who, each in past.items()
+            if each
         ]
 
     def _row(
         self,
         who: str,
+        dva: str,
         about: m.Registration,
         now: float,
         robot: RobotRow | None,
@@ -117,6 +120,7 @@ class RecordedDevices:
             beats_hz=recent / BEATING,
             holder=None if robot is None else robot["holder"],
             holder_label=None if robot is None else robot["holder_label"],
+            dva=None if who in self._dvas else self._dvas[dva],
         )
         row["link"] = None
         row["revocable"] = False
@@ -229,6 +233,7 @@ class RecordedRun:
             incidents=playback.incidents,
             things=self.things.all,
             link=how,
+            regions=plan_of(playback.scenario.dva.regions, playback.site),
             name=self.name,
             seed=playback.seed,
         )
@@ -339,7 +344,8 @@ class RecordedRun:
     def devices(self, now: float) -> DevicesLine:
         """Return the table of devices."""
         if self._devices is None:
-            self._devices = RecordedDevices(self.playback.recorder.traffic or (), DVA)
+            traffic = self.playback.recorder.traffic or ()
+            self._devices = RecordedDevices(traffic, dvas_of(self.playback.scenario))
         ids = {thing["i"]: thing["id"] for thing in self.things.all}
         robots = {ids[row["i"]]: row for row in self.robots(now)}
         doing = {label: at.mode for label, at, _ in self.tracks.places(now)}

@@ -80,13 +80,14 @@ class ConsoleSockets:
         clock: Waits for them.
         recorder: Recorder of messages and failures.
         host: Address to listen on.
-        port: Port for the DVA's requests; its publications have the next one. 0: any two free ones.
+        port: Port for the DVA's requests; its publications have the next one, and the DVAs of other
+            regions those behind. 0: any free ones.
         ring: Keys of the devices; None to run without.
         emulated: Random seed of the scenario's link, which is emulated between robots, guards and
             detectors and everybody else; None: it is not.
 
     Attributes:
-        dva: Address of the DVA, once it listens.
+        dva: Address of the DVA, or that of the first region, once it listens.
         crossing: The emulated link, if there is one.
         packets: Report on the packets, at the end.
     """
@@ -149,9 +150,9 @@ class ConsoleSockets:
             NetworkError: a port that is taken, or a host that is not this machine.
         """
         is_dva = kind == "dva"
-        port = self._port if is_dva else 0
+        port = self._port + 2 * (number - 1) if is_dva and self._port else 0
         address = self.network.join(id_of(kind, number), self._host, port)
-        if is_dva:
+        if is_dva and number == 1:
             self.dva = address
         return address
 

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Container
+from functools import partial
 from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.agents.device import RENEW_PERIOD, do_nothing
+from dva_sim.agents.device import PEER_STATUS, RENEW_PERIOD, do_nothing
 from dva_sim.console.bench import Bench
+from dva_sim.console.system.served_regions import ALARM_AFTER, ServedRegions
+from dva_sim.console.system.site_control_room import SiteControlRoom
 from dva_sim.console.system.system_state import SystemState
 from dva_sim.console.system.things import UNKNOWN_PERSON, UNKNOWN_ROBOT, Things
 from dva_sim.console.wire.rows import Hearing
@@ -28,7 +31,6 @@ ANSWER_WITHIN: Final = 1.0  # the DVA's answer, after which it counts as silent 
 POLL: Final = 2.0  # from one question who is there to the next [s]
 QUIET: Final = 1.0  # without a word, as half-way between two heartbeats, it is asked at once [s]
 UNHEARD: Final = 1.6  # without a word the DVA counts as silent; on slow links later [s]
-ALARM_AFTER: Final = 5.0  # without a word, two heartbeats long, its silence is an alarm [s]
 LOOK: Final = 0.1  # from one look whether it is time to ask to the next [s]
 ASK_SENSORS: Final = 10.0  # between questions about sensors and cameras [s]
 SOMEWHERE: Final = GeoFrame(0.0, 0.0)
@@ -48,6 +50,7 @@ class KnownSystem:
         recorder: Keeps the story.
         dva: Address of the DVA.
         labels: Labels of all devices ever known, by id.
+        regions: Regions of the site, of which its DVAs tell.
         site: Site, if one is known.
         bench: Bench on which the DVA runs; None: it runs elsewhere.
         things: Robots and people that are known already, with their numbers.
@@ -64,12 +67,13 @@ class KnownSystem:
 
     def __init__(
         self,
-        agent: ControlRoomAgent,
+        agent: SiteControlRoom,
         *,
         clock: PacedClock,
         recorder: Recorder,
         dva: str,
         labels: dict[str, str],
+        regions: ServedRegions,
         site: Site | None,
         bench: Bench | None,
         things: Things | None = None,
@@ -81,6 +85,7 @@ class KnownSystem:
         self.recorder = recorder
         self.dva = dva
         self.labels = labels
+        self.regions = regions
         self.site = site
         self.frame = SOMEWHERE if site is None else site.frame
         self.bench = bench
@@ -94,18 +99,23 @@ class KnownSystem:
         self._foreign: set[str] = set()
         self._here: dict[str, str] = {}  # labels of those from outside who are shown, by id
         self._met: set[str] = set()  # devices that the DVA has ever listed
-        self._listed = 0.0  # time of the DVA's newest list of devices [s]
+        self._listed: dict[str, float] = {}  # time of each DVA's newest list of devices [s]
         self._forgotten = -math.inf  # time at which the DVA last knew nothing of this console [s]
         self._asked = -POLL
-        self._is_asking = self._was_silent = False
+        self._asking: set[ControlRoomAgent] = set()
+        self._was_silent = False
         self._round_trip = 0.0  # of the latest question who is there [s]
 
     def start(self) -> None:
         """Take part, and ask again and again."""
         self.agent.on_list = self._note_all_events
-        self.agent.on_forgotten = self._ask_again
         self.agent.on_dispatch = self._note_switch
+        for room in self.agent.rooms:
+            room.on_forgotten = self._ask_again
         self.agent.start()
+        for dva in self.regions.own.values():
+            own = self.device.id_tag
+            self.device.network.subscribe(own, dva, PEER_STATUS, partial(self._hear_dva, dva))
         clock = self.clock
         self._started = clock.now
         clock.every(LOOK, self._look, start=clock.now + 0.05)
@@ -116,7 +126,7 @@ class KnownSystem:
     @property
     def hearing(self) -> Hearing:
         """Return `answers`, `silent`, or `never` for a DVA unheard since the start."""
-        if (heard := self.device.dva_watch.heard) is None:
+        if (heard := self._heard) is None:
             return "never"
         is_there = self.clock.now - heard < UNHEARD + self._round_trip
         return "answers" if is_there else "silent"
@@ -129,8 +139,18 @@ class KnownSystem:
     @property
     def is_silent(self) -> bool:
         """True if the DVA has said nothing for so long that somebody has to look after it."""
-        heard = self.device.dva_watch.heard
-        return self.clock.now - (self._started if heard is None else heard) > ALARM_AFTER
+        return self.clock.now - (self._heard or self._started) > ALARM_AFTER
+
+    @property
+    def _heard(self) -> float | None:
+        """Time of the newest word of a DVA; None: none has said any [s]."""
+        heard = (room.device.dva_watch.heard for room in self.agent.rooms)
+        return max((time for time in heard if time is not None), default=None)
+
+    def _hear_dva(self, dva: str, data: bytes) -> None:
+        message = self.device.read(data, dva)
+        if message is not None and isinstance(message.body, m.PeerStatus):
+            self.regions.heard[dva] = self.clock.now, message.body
 
     @property
     def role(self) -> str:
@@ -162,35 +182,39 @@ class KnownSystem:
         now = self.clock.now
         heard = self.device.dva_watch.heard or 0.0
         is_due = now - self._asked >= POLL or now - max(heard, self._asked) >= QUIET
-        if is_due and not self._is_asking:
-            self._ask_who()
+        if is_due:
+            self._asked = now
+            for room in self.agent.rooms:
+                if room not in self._asking:
+                    self._ask_who(room)
 
-    def _ask_who(self) -> None:
-        asked_at = self._asked = self.clock.now
-        self._is_asking = True
+    def _ask_who(self, room: ControlRoomAgent) -> None:
+        asked_at = self.clock.now
+        dva = room.device.dva
+        self._asking.add(room)
 
         def answered(reply: m.Reply) -> None:
-            self._is_asking = False
-            self._round_trip = min(self.clock.now - asked_at, ANSWER_WITHIN)
-            if self._was_silent and self.has_all_events:
-                self._ask_again()  # it may know nothing of an earlier life
-            self._was_silent = False
+            self._asking.discard(room)
+            if room is self.agent:
+                self._round_trip = min(self.clock.now - asked_at, ANSWER_WITHIN)
+                if self._was_silent and self.has_all_events:
+                    self._ask_again()  # it may know nothing of an earlier life
+                self._was_silent = False
             if isinstance(reply.content, m.DeviceList):
-                self._listed = self.clock.now
-                self.state.list(reply.content.devices)
+                own = {each.device.id_tag for each in self.agent.rooms}
+                self._listed[dva] = self.clock.now
+                self.state.list([d for d in reply.content.devices if d.id_tag not in own], dva)
 
-        def failed() -> None:
-            self._is_asking = False
-
-        self.agent.ask(m.GetDeviceList(), answered, failed)
+        room.ask(m.GetDeviceList(), answered, lambda: self._asking.discard(room))
 
     def _ask_again(self) -> None:
-        """Discard what was told of events until the DVA has told all there are."""
+        """Discard what was told of events until all are told again, by the first DVA at last."""
         self.has_all_events = False
         self._forgotten = self.clock.now
-        self.agent.events.clear()
-        self.agent.received_at.clear()
-        self.clock.call_after(0.0, self.agent.refresh)  # after the device has registered again
+        for room in reversed(self.agent.rooms):
+            room.events.clear()
+            room.received_at.clear()
+            self.clock.call_after(0.0, room.refresh)  # after the device has registered again
 
     def _note_all_events(self) -> None:
         self.has_all_events = True
@@ -205,7 +229,8 @@ class KnownSystem:
                 self.state.sensors(reply.content)
 
         if not all(entry.is_own for entry in self.state.devices.values()):
-            self.agent.ask(m.GetSensorInfo(), answered)
+            for room in self.agent.rooms:
+                room.ask(m.GetSensorInfo(), answered)
 
     # --- robots and people -----------------------------------------------------------------
 
@@ -246,7 +271,12 @@ class KnownSystem:
         if self.clock.now - self._forgotten < RENEW_PERIOD + POLL:
             return False
         entry = self.state.devices.get(id_tag)
-        return id_tag in self._met if entry is None else entry.listed < self._listed
+        return id_tag in self._met if entry is None else entry.listed < self._listed[entry.dva]
+
+    def dva_of(self, id_tag: str) -> str | None:
+        """Return the id of the DVA that lists a device; None if none does."""
+        entry = self.state.devices.get(id_tag)
+        return None if entry is None else entry.dva
 
     def id_of(self, number: int) -> str | None:
         """Return the id of a thing that pages know by a number; None: there is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -23,6 +23,7 @@ class DeviceState:
     Attributes:
         device: Device as in the list.
         listed: Time of the latest list that contains it [s].
+        dva: Id of the DVA whose list that is.
         is_own: True if it belongs to the console's own run, so that nobody need listen to it.
         heard: Time of its latest publication; None: never [s].
         status: Latest status that it published.
@@ -36,6 +37,7 @@ class DeviceState:
 
     device: m.Device
     listed: float
+    dva: str
     is_own: bool = False
     heard: float | None = None
     status: m.RobotStatus | m.PersonStatus | None = None
@@ -79,20 +81,20 @@ class SystemState:
     def _now(self) -> float:
         return self._device.clock.now
 
-    def list(self, devices: tuple[m.Device, ...]) -> None:
-        """Take the DVA's list of who is there."""
+    def list(self, devices: Sequence[m.Device], dva: str) -> None:
+        """Take the list of who is registered with a DVA."""
         before = {(i, entry.device) for i, entry in self.devices.items()}
         own = self._own()
         for device in devices:
             if device.id_tag in own:
                 label = self._labels[device.id_tag]
-                entry = DeviceState(replace(device, label=label), self._now, is_own=True)
+                entry = DeviceState(replace(device, label=label), self._now, dva, is_own=True)
                 self.devices[device.id_tag] = entry
-            elif device.id_tag != self._device.id_tag:
+            else:
                 named = self._labels.items()
                 others = [label for id_tag, label in named if id_tag != device.id_tag]
                 label = distinct(device.label, device.id_tag, others)
-                self._meet(replace(device, label=label))
+                self._meet(replace(device, label=label), dva)
         late = [i for i, entry in self.devices.items() if self._now - entry.listed > FORGET_AFTER]
         for id_tag in late:
             self.forget(id_tag)
@@ -113,19 +115,21 @@ class SystemState:
                 state.camera = one.camera_url
                 state.sensors = one.sensors
 
-    def _meet(self, device: m.Device) -> None:
+    def _meet(self, device: m.Device, dva: str) -> None:
         """Subscribe to a device, again if its address has changed."""
         self._labels[device.id_tag] = device.label
         entry = self.devices.get(device.id_tag)
         if entry is not None and entry.device.address == device.address:
             entry.device = device
             entry.listed = self._now
+            entry.dva = dva
             return
         if entry is not None:
             self._leave(entry)
-        state = self.devices[device.id_tag] = entry or DeviceState(device, self._now)
+        state = self.devices[device.id_tag] = entry or DeviceState(device, self._now, dva)
         state.device = device
         state.listed = self._now
+        state.dva = dva
         network = self._device.network
         me = self._device.id_tag
         node = device.id_tag

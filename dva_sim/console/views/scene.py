@@ -18,6 +18,7 @@ from dva_sim.console.wire.scenes import (
     PatternShown,
     Point,
     RasterShown,
+    RegionPlanShown,
     SceneLine,
     SiteShown,
     ThingShown,
@@ -26,12 +27,14 @@ from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures import colours
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario.regions import RegionPlan
 from dva_sim.worlds.maps import OCCUPIED
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import features_of
 from dva_sim.worlds.tints import floor_tint
 
 MAX_FEATURES = 20_000
+RIM = 0.01  # so near the edge of a site a border is none [m]
 RULES = {
     "S1": "A robot moves only by a command that came within the watchdog.",
     "S2": "One robot obeys one holder at a time.",
@@ -45,6 +48,7 @@ def scene_of(
     incidents: Sequence[RunHazard],
     things: list[ThingShown],
     link: LinkShown,
+    regions: RegionPlan | None = None,
     *,
     name: str,
     seed: int,
@@ -55,6 +59,7 @@ def scene_of(
         incidents: Its hazards.
         things: Everybody, with their numbers.
         link: Link and transport of the messages.
+        regions: Regions of the site, if it is divided.
         name: Name of the scenario.
         seed: Random seed of the run.
     """
@@ -64,7 +69,7 @@ def scene_of(
         "scenario": name,
         "title": " ".join(scenario.description.split()) or name,
         "seed": seed,
-        "site": site_of(site),
+        "site": site_of(site, regions),
         "things": things,
         "patterns": patterns_of(scenario.pattern),
         "link_limits": {key: list(limits) for key, limits in LINK_LIMITS.items()},
@@ -94,7 +99,7 @@ def patterns_of(own: str) -> list[PatternShown]:
     ]
 
 
-def site_of(site: Site) -> SiteShown:
+def site_of(site: Site, regions: RegionPlan | None = None) -> SiteShown:
     """Return the plan of a site, in metres and as GeoJSON in degrees."""
     tints: dict[str, str] = {}
     site_line: SiteShown = {
@@ -120,10 +125,25 @@ def site_of(site: Site) -> SiteShown:
         "solids_m": [_rounded(solid) for solid in site.solids],
         "doors_m": _rounded(np.asarray(site.doors).reshape(-1, 4)),
         "exits_m": [_rounded(way.ends) for way in site.exits],
+        "regions": [_region(site, *each) for each in regions.areas.items()] if regions else [],
     }
     if not site.rooms:
         site_line["raster"] = raster_of(site)
     return site_line
+
+
+def _region(site: Site, name: str, area: Any) -> RegionPlanShown:
+    ground = shapely.box(*site.extent)
+    within = shapely.line_merge((area & ground).boundary - ground.boundary.buffer(RIM))
+    west, _, _, north = (area & ground).bounds
+    corner = shapely.shortest_line(area & ground, shapely.Point(west, north))
+    return {
+        "name": name,
+        "borders_m": [
+            _rounded(shapely.get_coordinates(line)) for line in shapely.get_parts(within)
+        ],
+        "place_m": _rounded(shapely.get_coordinates(corner)[0]),
+    }
 
 
 def _place_in(site: Site, room: str) -> Point | None:

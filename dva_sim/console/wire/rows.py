@@ -90,8 +90,16 @@ class DoingShown(TypedDict):
     doing: str
 
 
+class RegionShown(TypedDict):
+    """A region, and who serves it in words: its own DVA, a deputy, or one that is dead."""
+
+    name: str
+    state: Literal["served", "deputy", "dead"]
+    text: str
+
+
 class RowsLine(TypedDict):
-    """States of clock, link, robots and people."""
+    """States of clock, link, robots and people, and of regions if there are several DVAs."""
 
     k: Literal["rows"]
     t: int
@@ -102,6 +110,7 @@ class RowsLine(TypedDict):
     people: list[DoingShown]
     order: OrderShown | None
     server: NotRequired[ServerShown]
+    regions: NotRequired[list[RegionShown]]
 
 
 class LatencyFigures(TypedDict):
@@ -170,12 +179,13 @@ class RobotWindowLine(TypedDict):
 
 
 class DeviceRow(TypedDict):
-    """A device, as the DVA knows it."""
+    """A device, as the DVA knows it that `dva` names."""
 
     id: str
     label: str
     type: str
     address: str
+    dva: str | None
     doing: str | None
     heard_s: float | None
     silent: bool

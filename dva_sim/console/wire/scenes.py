@@ -64,6 +64,14 @@ class RasterShown(TypedDict):
     heading_rad: NotRequired[float]
 
 
+class RegionPlanShown(TypedDict):
+    """A region of a site: its borders within that, and its corner in the north-west."""
+
+    name: str
+    borders_m: list[list[Point]]
+    place_m: Point
+
+
 class OriginShown(TypedDict):
     """Geographic origin of a site."""
 
@@ -83,6 +91,7 @@ class SiteShown(TypedDict):
     solids_m: list[list[Point]]
     doors_m: list[Point]
     exits_m: list[Point]
+    regions: list[RegionPlanShown]
     raster: NotRequired[RasterShown]
 
 

@@ -7,6 +7,7 @@ robot. What ends a drive ends it at once, and for good.
 from __future__ import annotations
 
 import time
+from functools import partial
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
@@ -172,7 +173,9 @@ class PhoneActions:
             if not isinstance(reply.content, m.DeviceList):
                 on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
                 return
+            known = self._world.system.state.devices.values()
             devices = [_shown(one) for one in reply.content.devices]
+            devices += [_shown(entry.device) for entry in known if entry.dva != device.dva]
             on_result(True, f"{len(devices)} devices", devices=devices)
 
         device.ask(device.dva, m.GetDeviceList(), answered, lambda: on_result(False, NO_ANSWER))
@@ -194,7 +197,8 @@ class PhoneActions:
             self._driving.hold()
             on_result(ok, text)
 
-        person.take([robot], answered, level)
+        take = partial(person.take, [robot], answered, level)
+        self._driving.turn(person, [robot], take, on_result)
 
     @does("phone_report")
     def _report(self, client: str, line: ReportAsked, on_result: OnResult) -> None:

@@ -31,6 +31,7 @@ from dva_sim.console.run.real_links import MakeSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.run.sliders import LinkSliders
 from dva_sim.console.system.known_system import KnownSystem
+from dva_sim.console.system.served_regions import regions_of
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.logs import Logs
@@ -45,7 +46,7 @@ from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
 from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.run import Run, Watched
-from dva_sim.simulation.full.stage import DVA, id_of, kind_of
+from dva_sim.simulation.full.stage import DVA, dvas_of, id_of, kind_of
 from dva_sim.simulation.scenario import Scenario
 
 FROM_OUTSIDE: Final = ("robot", "guard", "fake")  # kinds of devices, but for the run's own team
@@ -145,7 +146,8 @@ class ConsoleWorld(ConsolePages):
             breaches=self.recorder.broken.values,
         )
         self.feed.stoppers = self.driven.stoppers
-        self.feed.things.add(DVA, "dva", "dva")
+        for id_tag, label in dvas_of(scenario).items():
+            self.feed.things.add(id_tag, label, "dva")
         self.guards = PlayedGuards(self.run, self.feed)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
@@ -168,6 +170,7 @@ class ConsoleWorld(ConsolePages):
             recorder=self.recorder,
             dva=self.phones.address,
             labels=stage.labels,
+            regions=regions_of(self.scenario),
             site=stage.site,
             bench=self.bench,
             things=self.feed.things,
@@ -226,9 +229,9 @@ class ConsoleWorld(ConsolePages):
         return super().author(client)
 
     def _node_of(self, label: str) -> str | None:
-        """Return the id of a device of the run by its label."""
-        devices = self.run.stage.devices
-        return next((device.id_tag for device in devices if device.label == label), None)
+        """Return the id of a device of the run by its label; `dva` is that of the first region."""
+        ids = (device.id_tag for device in self.run.stage.devices if device.label == label)
+        return DVA if label == "dva" else next(ids, None)
 
     def _show_frame(self, line: FrameLine, robot: int) -> None:
         self.show(line, robot)
@@ -296,6 +299,7 @@ class ConsoleWorld(ConsolePages):
             incidents=run.field.incidents,
             things=self.system.things_here(),
             link=self.link(),
+            regions=run.stage.regions,
             name=self.name,
             seed=self.seed,
         )

@@ -15,7 +15,7 @@ from helpers.wording import unnamed
 
 from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.events.robot_conditions import UNHEARD
-from dva_sim.console.remote.options import check, own_id
+from dva_sim.console.remote.options import check, own_ids
 from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.published_rows import positions, robot_row
@@ -99,18 +99,19 @@ def test_an_audit_log_that_cannot_be_kept_is_told_before_anything_starts():
 
 
 def test_without_a_key_each_console_has_an_id_of_its_own():
-    assert own_id(None) != own_id(None)
+    assert own_ids(None) != own_ids(None)
+    assert len(set(own_ids(None, 3))) == 3
 
 
 def test_with_keys_it_is_the_control_room_whose_secret_is_here(tmp_path):
     create_keys(tmp_path, [id_of("dva", 1), ROOM])
-    assert own_id(KeyRing(tmp_path)) == ROOM
+    assert own_ids(KeyRing(tmp_path)) == [ROOM]
 
 
 def test_keys_without_one_of_a_control_room_are_not_enough(tmp_path):
     create_keys(tmp_path, [id_of("dva", 1)])
     with pytest.raises(ConfigError, match="control-room-1"):
-        own_id(KeyRing(tmp_path))
+        own_ids(KeyRing(tmp_path))
 
 
 # --- the programs ------------------------------------------------------------------------------

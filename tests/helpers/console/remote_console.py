@@ -34,27 +34,37 @@ class RemotePage:
         audit: File of the audit log.
         role: Role that the DVA gives its control room.
         number: Number of its control room.
+        scenario: Name or path of the world's scenario.
 
     Attributes:
         lines: Lines sent to the page.
     """
 
     def __init__(
-        self, world: PhonePage, audit: Path, role: str = "supervise", number: int = 900
+        self,
+        world: PhonePage,
+        audit: Path,
+        role: str = "supervise",
+        number: int = 900,
+        scenario: str = "hands-on",
     ) -> None:
         self.world, run = world, world.world.run
-        own = id_of("control-room", number)
-        run.dva.core.roles.appoint(own, role)
+        rooms = [id_of("control-room", number + 100 * order) for order in range(len(run.dvas))]
+        for dva in run.dvas.values():
+            for room in rooms:
+                dva.core.roles.appoint(room, role)
         links = RemoteLinks(
             clock=world.world.clock,
             recorder=Recorder(),
             network=run.network,
-            own=own,
+            own=rooms[0],
+            others=tuple(rooms[1:]),
+            dvas=tuple(run.dvas),
             address=f"198.51.100.9:{number}",
             seat_id=lambda seat: id_of("console", number + seat),
             join=lambda _: f"198.51.100.9:{number + 100}",
         )
-        options = ConsoleOptions(dva=DVA_HERE, scenario="hands-on", audit=audit)
+        options = ConsoleOptions(dva=DVA_HERE, scenario=scenario, audit=audit)
         self.keeper = AuditKeeper(audit, lambda: world.world.clock.now, {})
         self.pages = RemotePages(options, links, self.keeper)
         self.system = self.pages.system

@@ -9,6 +9,10 @@
  *   outdoor: boolean, place_m: number[] | null}} Room
  */
 /**
+ * A region of a site: its borders within that, and its corner in the north-west.
+ * @typedef {{name: string, borders_m: number[][][], place_m: number[]}} RegionPlan
+ */
+/**
  * A grid whose row 0 lies to the south; its cells as base64.
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
  *   cells: string, heading_rad?: number}} Raster
@@ -17,7 +21,7 @@
  * The plan of a site.
  * @typedef {{name: string, extent_m: number[], origin: Origin, features: Record<string, any>,
  *   rooms: Room[], walls_m: number[][], solids_m: number[][][], doors_m: number[][],
- *   exits_m: number[][], raster?: Raster}} Site
+ *   exits_m: number[][], regions: RegionPlan[], raster?: Raster}} Site
  */
 /**
  * A robot's camera.
@@ -117,9 +121,14 @@
  *   log?: 'unknown' | 'kept' | 'not_kept' | 'not_permitted'}} Server
  */
 /**
- * States of clock, link, robots and people.
+ * A region, and who serves it in words: its own DVA, a deputy, or one that is dead.
+ * @typedef {{name: string, state: 'served' | 'deputy' | 'dead', text: string}} Region
+ */
+/**
+ * States of clock, link, robots and people, and of regions if there are several DVAs.
  * @typedef {{k: 'rows', t: number, clock: Clock, link: Link | null, dropped: number,
- *   robots: RobotRow[], people: Doing[], order: Order | null, server?: Server}} Rows
+ *   robots: RobotRow[], people: Doing[], order: Order | null, server?: Server,
+ *   regions?: Region[]}} Rows
  */
 /**
  * A hazard on the map.
@@ -263,13 +272,14 @@
  *   replies: LatencyFigures | null, faults: Faults, sensors: Sensor[]}} RobotWindow
  */
 /**
- * A device, as the DVA knows it.
- * @typedef {{id: string, label: string, type: string, address: string, doing: string | null,
- *   heard_s: number | null, silent: boolean, beats_hz: number, link: string | null, fake: boolean,
- *   round_trip_s: number | null, commands_hz: number | null, refused: number | null,
- *   picture_age_s: number | null, holder: string | null, holder_label: string | null,
- *   level: string | null, ends_s: number | null, holder_known?: boolean, revocable?: boolean,
- *   camera?: string | null, sensors?: string[]}} DeviceRow
+ * A device, as the DVA knows it that `dva` names.
+ * @typedef {{id: string, label: string, type: string, address: string, dva: string | null,
+ *   doing: string | null, heard_s: number | null, silent: boolean, beats_hz: number, link: string
+ *   | null, fake: boolean, round_trip_s: number | null, commands_hz: number | null,
+ *   refused: number | null, picture_age_s: number | null, holder: string | null,
+ *   holder_label: string | null, level: string | null, ends_s: number | null,
+ *   holder_known?: boolean, revocable?: boolean, camera?: string | null, sensors?: string[]}}
+ *   DeviceRow
  */
 /**
  * All devices.

@@ -1,6 +1,6 @@
 /** Devices page: connected devices and their holders; fake devices can be added. */
 import { html, useState } from '../../vendor/preact.js';
-import { deviceList, isAttached, isPast, maySteer, maySupervise, rows } from '../store.js';
+import { deviceList, isAttached, isPast, maySteer, maySupervise, rows, scene } from '../store.js';
 import { act } from '../net/actions.js';
 import { sinceSent } from '../net/world_time.js';
 import { useTable } from '../logs/looking.js';
@@ -19,6 +19,8 @@ export function DevicesPage() {
   useTable('devices');
   const [isAdding, setAdding] = useState(false);
   const list = [...deviceList.value.devices].sort(byKind);
+  const isDivided = Boolean(scene.value?.site?.regions.length);
+  const heads = isDivided ? [...HEADS.slice(0, 2), ['DVA', ''], ...HEADS.slice(2)] : HEADS;
   return html`<main class="page devices-page" id="main" tabindex="-1">
     <h1 class="hidden">Devices</h1>
     <section class="panel" aria-label="Devices known to the DVA">
@@ -28,9 +30,9 @@ export function DevicesPage() {
       ${isAdding && html`<${FakeForm} onDone=${() => setAdding(false)} />`}
       <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways">
         <table aria-label="Devices">
-          <thead><tr>${HEADS.map(([head, unit]) => html`<th scope="col">${head || html`<span class="hidden">Actions</span>`}${
+          <thead><tr>${heads.map(([head, unit]) => html`<th scope="col">${head || html`<span class="hidden">Actions</span>`}${
             unit && html`<small> ${unit}</small>`}</th>`)}</tr></thead>
-          <tbody class="reported">${list.map((device) => html`<${Row} key=${device.id} device=${device} />`)}</tbody>
+          <tbody class="reported">${list.map((device) => html`<${Row} key=${device.id} device=${device} isDivided=${isDivided} />`)}</tbody>
         </table>
         ${!list.length && html`<p class="soft">${rows.value?.server?.own === false ? 'The DVA has not told its devices yet.' : 'No device is registered.'}</p>`}
       </div>
@@ -47,12 +49,12 @@ const ORDER = ['Robot', 'Guard', 'TeleOp', 'Teleoperation', 'Remote Control', 'C
 const byKind = (a, b) =>
   ORDER.indexOf(a.type) - ORDER.indexOf(b.type) || a.id.localeCompare(b.id);
 
-/** @param {{device: any}} props */
-function Row({ device }) {
+/** @param {{device: any, isDivided: boolean}} props */
+function Row({ device, isDivided }) {
   const later = sinceSent(deviceList.value);
   return html`<tr class=${device.silent ? 'silent' : ''}>
     <th scope="row">${device.label}${device.fake && html` <span class="tag">fake</span>`}</th>
-    <td>${device.type}</td><td>${device.id}</td><td>${device.address}</td>
+    <td>${device.type}</td>${isDivided && html`<td>${device.dva ?? '–'}</td>`}<td>${device.id}</td><td>${device.address}</td>
     <td><${Health} device=${device} /></td>
     <td>${device.doing ?? (isAttached.value ? UNKNOWN : '–')}</td>
     <td class="n">${number(device.heard_s, 1, later)}</td><td class="n">${number(device.beats_hz, 1)}</td>

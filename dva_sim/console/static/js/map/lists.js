@@ -4,6 +4,7 @@ import { doingOf, events, modeOf, rowOf, rows, scene, selection } from '../store
 import { ageOf } from '../net/world_time.js';
 import { ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, percentText, plain } from '../ui/words.js';
+import { Regions } from './regions.js';
 import { eventsInOrder, isOpen, roomOf } from './shown.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -11,7 +12,7 @@ import { eventsInOrder, isOpen, roomOf } from './shown.js';
 
 /** All of them. */
 export function Lists() {
-  return html`<div class="lists reported"><${Events} /><${Robots} /><${People} kind="guard"
+  return html`<div class="lists reported"><${Regions} /><${Events} /><${Robots} /><${People} kind="guard"
     title="Guards" /><${People} kind="bystander" title="Bystanders" /></div>`;
 }
 

@@ -12,20 +12,22 @@ const HIT_PX = 12;
 const EVERY_SECOND = 1000;
 
 /** @typedef {import('./bodies.js').Pen} Pen */
+/** @typedef {(pen: Pen, written: import('./lettering.js').Place[]) => void} Draw */
 /** @typedef {import('./bodies.js').Body} Body */
 
 export class Live {
   /**
    * @param {import('./plan.js').Plan} ground
-   * @param {() => number[]} cones robots whose cone of sight is drawn
-   * @param {() => import('../types.js').Goal[]} goals
-   * @param {() => number[][][]} ways routes to follow [m]
+   * @param {{cones: () => number[], goals: () => import('../types.js').Goal[],
+   *   ways: () => number[][][], under: Draw}} options robots whose cone of sight is drawn, goals,
+   *   routes to follow [m], what is drawn first
    */
-  constructor(ground, cones, goals, ways) {
+  constructor(ground, { cones, goals, ways, under }) {
     this.ground = ground;
     this.cones = cones;
     this.goals = goals;
     this.ways = ways;
+    this.under = under;
     this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
     /** @type {Body[]} */
     this.bodies = [];
@@ -52,6 +54,7 @@ export class Live {
     this.bodies = placed(affine, now);
     this.ground.drawNames(pen, this.written); // as it was written last
     this.written = [];
+    this.under(pen, this.written);
     this.drawCones(pen, now);
     this.drawTrails(pen);
     this.drawWays(pen);

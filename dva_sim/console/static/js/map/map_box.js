@@ -17,10 +17,11 @@ const TAP_PX = 5;
 /**
  * @param {{cones: () => number[], follows?: () => number | null, keyboard?: boolean,
  *   legend?: boolean, goals?: () => import('../types.js').Goal[], ways?: () => number[][][],
- *   onPlace?: (x: number, y: number) => void}} props `onPlace` gets the tapped position [m]
+ *   under?: import('./live.js').Draw, onPlace?: (x: number, y: number) => void}} props `under` draws
+ *   below all that moves, `onPlace` gets the tapped position [m]
  */
 export function MapBox(props) {
-  const { cones, follows, keyboard = true, legend = true, goals = () => [], ways = () => [] } = props;
+  const { cones, follows, keyboard = true, legend = true, goals = () => [], ways = () => [], under = () => {} } = props;
   const onPlace = useRef(props.onPlace);
   onPlace.current = props.onPlace;
   const box = useRef(/** @type {HTMLElement | null} */ (null));
@@ -29,7 +30,7 @@ export function MapBox(props) {
   const plan = scene.value;
   useEffect(() => {
     if (!plan || !box.current) return undefined;
-    const options = { cones, keyboard, goals, ways, onPlace };
+    const options = { cones, keyboard, goals, ways, under, onPlace };
     return show(box.current, plan, options, view, () => follow(false));
   }, [plan]);
   useEffect(() => {
@@ -50,14 +51,14 @@ export function MapBox(props) {
  * @param {import('../lines.js').Scene} plan
  * @param {{cones: () => number[], keyboard: boolean,
  *   goals: () => import('../types.js').Goal[], ways: () => number[][][],
- *   onPlace: {current: ((x: number, y: number) => void) | undefined}}} options
+ *   under: import('./live.js').Draw, onPlace: {current: ((x: number, y: number) => void) | undefined}}} options
  * @param {{current: MapView | null}} view
  * @param {() => void} letGo
  */
 function show(element, plan, options, view, letGo) {
   const ground = new Plan(plan.site);
   const fields = new Fields();
-  const live = new Live(ground, options.cones, options.goals, options.ways);
+  const live = new Live(ground, options);
   const paper = {
     draw: (/** @type {any} */ ctx, /** @type {any} */ affine) =>
       ground.draw(ctx, affine, colours.peek()),

@@ -4,6 +4,7 @@ import { robots, selection } from '../store.js';
 import { Card } from './card.js';
 import { Lists } from './lists.js';
 import { MapBox } from './map_box.js';
+import { drawRegions } from './regions.js';
 
 const FEW = 12;
 
@@ -20,7 +21,7 @@ export function MapPage() {
   return html`<main class="page map-page" id="main" tabindex="-1">
     <h1 class="hidden">Map</h1>
     <section class="map-region" aria-label="Map">
-      <${MapBox} cones=${cones} follows=${() => robots.peek()[0]?.i ?? null} />
+      <${MapBox} cones=${cones} under=${drawRegions} follows=${() => robots.peek()[0]?.i ?? null} />
       <${Card} />
     </section>
     <${Lists} />
