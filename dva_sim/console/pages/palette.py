@@ -22,7 +22,6 @@ from dva_sim.worlds.hazards import KINDS as HAZARDS
 STATIC = Path(__file__).parent.parent / "static"
 TEXT, MARK = 4.5, 3.0  # contrast that words and marks need at least (WCAG 2.2)
 
-_DARK_FLOOR = "#2a3038"
 _DARK_INK = "#16191d"
 Palette = Mapping[str, str]
 
