@@ -231,7 +231,11 @@ class ConsoleOptions(PageOptions):
     ] = ()
     dva: Annotated[
         str | None,
-        OptionForm("Show the system of this DVA; SCENARIO provides the map.", metavar="HOST:PORT"),
+        OptionForm(
+            "Show the system of this DVA, or of the DVAs of all regions, with commas between; "
+            "SCENARIO provides the map.",
+            metavar="HOST:PORT",
+        ),
     ] = None
     keys: Annotated[
         Path | None,

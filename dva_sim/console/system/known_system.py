@@ -208,7 +208,7 @@ class KnownSystem:
         room.ask(m.GetDeviceList(), answered, lambda: self._asking.discard(room))
 
     def _ask_again(self) -> None:
-        """Discard what was told of events until all are told again, by the first DVA at last."""
+        """Discard the news of events, and ask each DVA for its events again, the first one last."""
         self.has_all_events = False
         self._forgotten = self.clock.now
         for room in reversed(self.agent.rooms):
