@@ -24,7 +24,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.full.stage import id_of, team_of
+from dva_sim.simulation.full.stage import DVA, id_of, team_of
 from dva_sim.simulation.scenario import build, load
 from dva_sim.worlds.geo import GeoFrame
 
@@ -38,7 +38,7 @@ HERE = GeoFrame(38.66, -9.2)
 
 
 def device_state(kind: str = "Robot", **more: object) -> DeviceState:
-    return DeviceState(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, **more)
+    return DeviceState(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, DVA, **more)
 
 
 def row_of(state: DeviceState, is_lost: bool = False) -> DeviceRow:
