@@ -165,8 +165,8 @@ class Supervisor:
         for number, name in enumerate(regions, 1):
             self._start(f"dva-{name}", "dva", dva, number)
             self._parts[-1].may_die = True
-        while not self._interrupted and any(part.latest is None for part in self._parts):
-            self._listen()
+            while not self._interrupted and self._parts[-1].latest is None:
+                self._listen()  # so that their addresses are told in order
         return None if self._interrupted else dva
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:

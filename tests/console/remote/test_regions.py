@@ -1,11 +1,18 @@
 """A console that is attached to several DVAs: by their messages alone, as far as they tell."""
 
 import json
+import os
+import re
+import signal
+import urllib.request
 from pathlib import Path
+from typing import Any
 
 import pytest
+from helpers.console.console_program import started
 from helpers.console.remote_console import RemotePage
 from helpers.console.simulated_phone import PhonePage
+from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
@@ -114,6 +121,43 @@ def test_a_dva_that_is_started_again_tells_its_events_anew(page):
     page.let(15.0)
     assert page.system.has_all_events
     assert {row["kind"] for row in page.events()} == {"fire", "flood"}
+
+
+# --- the programs -------------------------------------------------------------------------------
+
+
+@pytest.mark.system
+def test_it_joins_live_dvas_and_goes_on_when_one_is_killed(programs, path):
+    live = programs.start("live", path, "--for", "1000")
+    live.wait_to_say("is sent to event", "DVA: ")
+    dvas = re.findall(r"^DVA: (\S+)$", live.output, re.MULTILINE)
+    console, address = started(programs, path, "--dva", ",".join(dvas))
+    console.wait_to_say(f"Attached to: {dvas[0]},{dvas[1]}")
+
+    def state() -> dict[str, Any]:
+        base, _, token = address.partition("?token=")
+        headers = {"Authorization": f"Bearer {token}"}
+        request = urllib.request.Request(f"{base}api/state", headers=headers)
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return json.load(answer)
+
+    def shown() -> tuple[set[str], set[str]]:
+        now = state()
+        robots = {one["label"] for one in now["robots"] if "x_m" in one}
+        return {one["kind"] for one in now["events"]}, robots
+
+    everything = {"fire", "flood"}, {"robot-1", "robot-2"}
+    assert becomes(lambda: shown() == everything)
+    killed = next(
+        process
+        for process, command in programs.processes().items()
+        if '"part": "dva", "number": 1' in command
+    )
+    os.kill(killed, signal.SIGKILL)
+    live.wait_to_say("takes over low")
+    assert becomes(lambda: shown() == everything)
+    numbers = [one["i"] for one in state()["robots"] if one.get("silent")]
+    assert numbers == []
 
 
 # --- how it is asked for ------------------------------------------------------------------------
