@@ -122,8 +122,10 @@ class DecisionAudit(Audited):
     def heard(self, record: m.AuditRecord) -> None:
         """Take the DVA's record of a decision."""
         for number, decision in self._asked.items():
-            rooms = self._room(decision.client), *self._others
-            if decision.matches(record) and record.author in rooms:
+            if decision.matches(record) and record.author in (
+                self._room(decision.client),
+                *self._others,
+            ):
                 decision.record = record
                 self._finish(number)
                 return

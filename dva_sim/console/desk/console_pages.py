@@ -183,8 +183,13 @@ class ConsolePages:
     def keep_audit(self, keeper: AuditKeeper) -> None:
         """Keep what people do, and what the DVA decides, from now on."""
         rooms = self.rooms
-        others = [room.device.id_tag for room in self.system.agent.rooms[1:]]
-        self.audited = DecisionAudit(keeper, self.system, self.author, rooms.room_of, others)
+        self.audited = DecisionAudit(
+            keeper,
+            self.system,
+            self.author,
+            rooms.room_of,
+            others=[room.device.id_tag for room in self.system.agent.rooms[1:]],
+        )
 
     def hear_record(self, record: m.AuditRecord) -> None:
         """Keep a decision, and note who takes a robot from its driver, whom the DVA names not."""

@@ -160,9 +160,10 @@ class DecisionActions:
         seen_decisions = status.decisions if decisions is None else decisions
 
         def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
-            agent = self._rooms.listener.about(status.event_id, agent)
-            mission = self.sent.send(client, agent, robot, status)
-            mission.begin(line.get("reason") or None, seen_decisions, on_result)
+            room = self._rooms.listener.about(status.event_id, agent)
+            self.sent.send(client, room, robot, status).begin(
+                line.get("reason") or None, seen_decisions, on_result
+            )
 
         on_result = self._seeing(client, line, on_result)
         self._rooms.decide(client, _role(line), on_result, send)

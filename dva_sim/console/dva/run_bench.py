@@ -91,5 +91,6 @@ class RunBench:
 
     def is_registered(self, device: str) -> bool:
         """Return True if an id is that of a DVA, or stands in the book of one."""
-        books = (dva.core.registry.entries for dva in self._run.dvas.values())
-        return device in self._run.dvas or any(device in book for book in books)
+        return device in self._run.dvas or any(
+            device in dva.core.registry.entries for dva in self._run.dvas.values()
+        )

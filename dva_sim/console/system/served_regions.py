@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from dva_sim.console.wire.rows import RegionShown
+from dva_sim.console.wire.rows import RegionShown, RegionState
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import dvas_of
 from dva_sim.simulation.scenario import Scenario
@@ -42,15 +42,15 @@ class ServedRegions:
             if each.region == region
         )
         _, dva = max(claims, default=(1, own))
-        if dva not in there:
-            text = f"{self.labels[dva]} is silent: nobody serves it"
-            return {"name": region, "state": "dead", "text": text}
-        text = f"served by {self.labels[dva]}"
-        if dva == own:
-            return {"name": region, "state": "served", "text": text}
         how = "is back, and may get it back" if own in there else "is silent"
-        text += f", its deputy, as {self.labels[own]} {how}"
-        return {"name": region, "state": "deputy", "text": text}
+        state: RegionState = "served" if dva == own else "deputy"
+        state = state if dva in there else "dead"
+        text = {
+            "served": f"served by {self.labels[dva]}",
+            "deputy": f"served by {self.labels[dva]}, its deputy, as {self.labels[own]} {how}",
+            "dead": f"{self.labels[dva]} is silent: nobody serves it",
+        }
+        return {"name": region, "state": state, "text": text[state]}
 
 
 def regions_of(scenario: Scenario) -> ServedRegions:

@@ -90,11 +90,15 @@ class DoingShown(TypedDict):
     doing: str
 
 
+# Whether a region is served by its own DVA, by its deputy, or by none that is there.
+RegionState = Literal["served", "deputy", "dead"]
+
+
 class RegionShown(TypedDict):
-    """A region, and who serves it in words: its own DVA, a deputy, or one that is dead."""
+    """A region, and in words who serves it."""
 
     name: str
-    state: Literal["served", "deputy", "dead"]
+    state: RegionState
     text: str
 
 

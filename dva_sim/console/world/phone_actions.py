@@ -197,8 +197,9 @@ class PhoneActions:
             self._driving.hold()
             on_result(ok, text)
 
-        take = partial(person.take, [robot], answered, level)
-        self._driving.turn(person, [robot], take, on_result)
+        self._driving.turn(
+            person, [robot], partial(person.take, [robot], answered, level), on_result
+        )
 
     @does("phone_report")
     def _report(self, client: str, line: ReportAsked, on_result: OnResult) -> None:

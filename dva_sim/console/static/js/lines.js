@@ -121,7 +121,7 @@
  *   log?: 'unknown' | 'kept' | 'not_kept' | 'not_permitted'}} Server
  */
 /**
- * A region, and who serves it in words: its own DVA, a deputy, or one that is dead.
+ * A region, and in words who serves it.
  * @typedef {{name: string, state: 'served' | 'deputy' | 'dead', text: string}} Region
  */
 /**
