@@ -206,6 +206,17 @@ def test_a_robot_is_taken_over_from_a_driver_in_another_region(monkeypatch):
     assert robots(page)[0].holder[0] == id_of("console", 2)
 
 
+def test_a_robot_goes_by_itself_to_an_event_in_another_region_than_the_console_is(monkeypatch):
+    page = hall(monkeypatch, events=FIRES, dispatch__mode="ask_first")
+    move_to_the_east(page)
+    number = events(page)["flood"]["number"]
+    asked = page.ask("mission", event=number, robot="robot-1", role="dispatch")
+    assert asked["ok"], asked
+    page.until(lambda: robots(page)[0].controller.mode is Mode.MISSION)
+    page.until(lambda: "robot-1" in events(page)["flood"]["assigned"])
+    assert not page.world.recorder.broken
+
+
 # --- phones -------------------------------------------------------------------------------------
 
 
