@@ -163,6 +163,7 @@ class ConsoleRooms:
             return None
         self._used.add(number)
         agent = ControlRoomAgent(self._device(LISTENER + number, name or f"{role}-{number}"))
+        agent.device.dva = self.listener.device.dva  # which answers, where another may be dead
         self._appoint(agent.device.id_tag, ControlRoomRole(role))
         return ConsoleRoom(number, agent, role)
 

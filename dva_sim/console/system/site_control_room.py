@@ -27,7 +27,10 @@ class SiteControlRoom(ControlRoomAgent):
         self.rooms = [self, *map(ControlRoomAgent, others)]
         for room in self.rooms[1:]:
             room.on_event = self._note
-            room.on_record = self._take
+            # Where this one has turned to the DVA of that room, it hears the record itself.
+            room.on_record = lambda record, dva=room.device.dva: self._take(  # type: ignore[misc]
+                record if dva != self.device.dva else None
+            )
 
     @override
     def start(self) -> None:

@@ -34,7 +34,6 @@ from dva_sim.worlds.site_export import features_of
 from dva_sim.worlds.tints import floor_tint
 
 MAX_FEATURES = 20_000
-RIM = 0.01  # so near the edge of a site a border is none [m]
 RULES = {
     "S1": "A robot moves only by a command that came within the watchdog.",
     "S2": "One robot obeys one holder at a time.",
@@ -134,7 +133,8 @@ def site_of(site: Site, regions: RegionPlan | None = None) -> SiteShown:
 
 def _region(site: Site, name: str, area: Any) -> RegionPlanShown:
     ground = shapely.box(*site.extent)
-    within = shapely.line_merge((area & ground).boundary - ground.boundary.buffer(RIM))
+    # Within a centimetre it is the edge of the site, and no border.
+    within = shapely.line_merge((area & ground).boundary - ground.boundary.buffer(0.01))
     west, _, _, north = (area & ground).bounds
     corner = shapely.shortest_line(area & ground, shapely.Point(west, north))
     return {

@@ -120,6 +120,13 @@ def test_a_dead_dva_is_an_alarm_until_its_region_is_its_own_again(monkeypatch):
     assert alarms(page)[f"{text} silent"] == "high"
     assert {"fire", "flood"} == events(page).keys()
     assert set(dvas(page).values()) == {None, "dva-east"}
+    records = []
+    page.world.system.agent.on_record = records.append
+    number = events(page)["flood"]["number"]
+    asked = page.ask("event_note", event=number, text="a note", role="dispatch")
+    assert asked["ok"], asked
+    page.let(1.0)
+    assert [record.action for record in records].count("note") == 1
     page.world.run.start_region_again(1)
     page.let(5.0)
     assert alarms(page)[f"{text} back, and may get it back"] == "high"
