@@ -395,7 +395,7 @@
  * @typedef {{k: 'pong', at: any, now: number}} Pong
  */
 /**
- * An entry in its place.
+ * An entry with its row number and hash.
  * @typedef {{time_s: number, at_utc: string, author: string, device: string, role: string,
  *   action: string, event: number | null, subject: string, cause: string, outcome: string,
  *   text: string, details: Record<string, any>, number: number, before: string, hash: string}}
