@@ -38,7 +38,7 @@ from dva_sim.validation.network.real_side.measuring import Progress
 from dva_sim.validation.network.verdicts import ConditionGroup, grouped
 from dva_sim.validation.operators import evidence as operators_evidence
 from dva_sim.validation.operators import experiments as operators
-from dva_sim.validation.operators.exact import EXACT
+from dva_sim.validation.operators.exact import MODEL_CHECKS
 from dva_sim.validation.operators.experiments import EXPERIMENTS
 
 WIDTH = 110  # minimum width of tables, also in a file
@@ -180,10 +180,10 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
     setting = operators.OperatorsSetting(strategy or split.strategy, seed, persons, quick, workers)
     try_strategy(setting.strategy)  # whether there is one, is known before anything is played
     with _bar() as bar:
-        exact = len(EXACT)
+        exact = len(MODEL_CHECKS)
         task = bar.add_task("exact", total=exact + operators.jobs_of(EXPERIMENTS, setting))
         simulated = operators.play_exact(
-            list(EXACT), setting, lambda n: bar.update(task, completed=n)
+            list(MODEL_CHECKS), setting, lambda n: bar.update(task, completed=n)
         )
         bar.update(task, description="persons")
         played = operators.play_experiments(

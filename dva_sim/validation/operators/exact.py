@@ -129,7 +129,7 @@ def _alarm_time(ppm: float) -> float:
 
 SMITH = 4.0, 0.5, 1.5  # gain [1/s], delay [s] and time of the look at it [s]
 
-EXACT: dict[str, Callable[[int], Values]] = {
+MODEL_CHECKS: dict[str, Callable[[int], Values]] = {
     "S1": lambda seed: {"critical": critical(integrator, 1.0, 2.2)},
     "S2": lambda seed: {"critical": critical(pure_pursuit, 0.3, 0.8)},
     "S3": lambda seed: {"response": smith_response(*SMITH)[-1]},

@@ -27,7 +27,7 @@ from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.movement_laws import fit_line
 from dva_sim.validation.frame import Progress, job_of, play_jobs
-from dva_sim.validation.operators.exact import EXACT
+from dva_sim.validation.operators.exact import MODEL_CHECKS
 from dva_sim.validation.operators.looking import PARTS
 from dva_sim.validation.operators.trials import (
     Cells,
@@ -652,7 +652,7 @@ def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int
 
 def perform_exact(job: StudyJob) -> Tables:
     """Return one exact check."""
-    values = EXACT[job.config](job.seed)
+    values = MODEL_CHECKS[job.config](job.seed)
     return {"rows": [{"line": line, "value": value} for line, value in values.items()]}
 
 
