@@ -238,7 +238,7 @@ class RosbridgeServer:
             peer.offer(topic, self._map)
 
     def changed(self) -> None:
-        """See `PeerHost`: subscribe to those topics of each robot that a client wants."""
+        """See `PeerHost`: subscribe to the topics of each robot that any client wants."""
         topics = {
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }

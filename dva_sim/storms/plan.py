@@ -33,7 +33,7 @@ PROBES_LAST: Final = 120.0
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault of a storm.
+    """A fault that a storm causes, at a time or at a message.
 
     Attributes:
         kind: Its name, as in `dva_sim.storms.faults.FAULTS`.

@@ -1,4 +1,4 @@
-"""One file: its kind, its mistakes, and the schema of such files."""
+"""A file's kind, its mistakes, and the schema of files of its kind."""
 
 from __future__ import annotations
 

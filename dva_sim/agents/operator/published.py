@@ -163,7 +163,7 @@ class RuleConfig(Config):
 
 
 class ComparisonConfig(Config):
-    """One comparison of the operators of its day with the lines.
+    """A comparison of the simulated operators of one day with the published lines.
 
     Attributes:
         day: Day on which it was made.

@@ -399,7 +399,7 @@ class RobotController:
         if grant is not None and current is not None and grant.session == current.session:
             return Decision(m.OK)  # the same holder, perhaps at another address
         if grant is not None and grant.session != self._numbered:
-            # A holder's message numbers begin anew with its session.
+            # A new session of a holder may reuse message numbers.
             self.last_order_id = 0
             self.last_set_id = 0
             self._numbered = grant.session

@@ -79,8 +79,10 @@ class RecordedDevices:
                 body = decode(data).body
             except ProtocolError:
                 return
-            if isinstance(body, m.Registration):
-                self._registered.setdefault(who, []).append((sent.time, sent.destination, body))
+            moves = self._registered.setdefault(who, [])
+            is_news = not moves or moves[-1][1] != sent.destination  # else it is a renewal
+            if isinstance(body, m.Registration) and is_news:
+                moves.append((sent.time, sent.destination, body))
 
     def rows(
         self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]

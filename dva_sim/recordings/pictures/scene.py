@@ -1,4 +1,4 @@
-"""One run on one map: the site, hazards, robots and people, the story, and the outcome."""
+"""The picture of a run: its map with hazards, robots and people, the story and the outcome."""
 
 from __future__ import annotations
 

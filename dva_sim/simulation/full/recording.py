@@ -154,7 +154,7 @@ class Playback:
 
 @dataclass(kw_only=True)
 class Recording(Playback):
-    """All results of one run, to be measured.
+    """Results of a run, from which measures are computed.
 
     Attributes:
         robots: Measures of the robots, by id.

@@ -22,7 +22,7 @@ SIZE = 100  # size of a reading or frame; the line is so fast that it does not m
 
 
 class Channel(Generic[T]):
-    """One direction of a link: items arrive late and in order, or are lost.
+    """A link in one direction: items arrive late but in order, or are lost.
 
     Args:
         delay: Delay, jitter and loss.

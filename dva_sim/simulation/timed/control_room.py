@@ -48,7 +48,7 @@ class Team(ShiftWorld, Protocol):
 def travel(
     shift: Team, starts: Sequence[Start], goals: Sequence[m.Position]
 ) -> tuple[Floats, Floats]:
-    """See `core.travel_times.Travel`: the expected times of each responder.
+    """Return the expected travel times of each responder; see `core.travel_times.Travel`.
 
     Where each way's time is drawn for itself it is known beforehand: choosing by it is the
     point of such a world.

@@ -1,4 +1,4 @@
-"""All hazards of one run on one site: the conditions at any place and time."""
+"""Conditions that the hazards of a run cause on its site, at any place and time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Raster(NamedTuple):
 
 
 class Surroundings:
-    """All hazards of one run; each field is solved only when and as far as it is queried.
+    """The hazards of a run; each field is solved only as far as somebody queries it.
 
     Two fires do not know of each other: their smoke adds up, the hotter air counts.
 

@@ -72,7 +72,7 @@ class RosVisitor(ScriptedRosClient):
 
 
 class CameraVisitor:
-    """One picture of a camera.
+    """A visitor who fetches a camera's picture and leaves.
 
     Args:
         address: Address of the pictures, with `LABEL` for a robot.
@@ -88,7 +88,7 @@ class CameraVisitor:
 
 
 class Visitors:
-    """All who are here.
+    """Visitors of all kinds who are present.
 
     Args:
         doors: Functions that let one more of a kind in, by the kind.
