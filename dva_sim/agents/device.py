@@ -79,7 +79,8 @@ class AgentDevice:
         other_id: Description of how to give it another id, if its own is in use.
         dva_address: Address at which it looks for the DVA; empty if people need not know it.
         dva_watch: Watch on the DVA's heartbeats.
-        on_dva: Callback for another DVA, by id, that the device obeys from then on.
+        on_dva: Callback for another DVA, by id, that the device obeys from then on, and for
+            its own one when that was started again.
         is_engaged: Predicate: True while the device has to stay with its DVA.
     """
 
@@ -584,7 +585,9 @@ class AgentDevice:
         message = self.read(data, self.dva)
         if message is None or not isinstance(message.body, m.Heartbeat):
             return
-        self.dva_watch.beat(self.clock.now)
+        is_restarted = self.dva_watch.beat(self.clock.now, message.message_id)
+        if is_restarted and len(self.dvas) > 1:  # it may have forgotten who holds what
+            self.ask(self.dva, self._registration, lambda _: self.on_dva(message.source))
         self._look_for_dva()
 
     def _look_for_dva(self) -> None:

@@ -21,19 +21,24 @@ class DvaWatch:
     Attributes:
         heard: Time of the DVA's latest message [s]; None: never.
         beats: True once a heartbeat of it has come.
+        number: Number of the latest heartbeat.
         unanswered: True while the newest request has failed.
         silent: True if it was silent at the last look.
     """
 
     heard: float | None = None
     beats: bool = False
+    number: int = 0
     unanswered: bool = False
     silent: bool = False
 
-    def beat(self, now: float) -> None:
-        """Note a heartbeat."""
+    def beat(self, now: float, number: int) -> bool:
+        """Note a heartbeat; return True if it is numbered below the last: the DVA restarted."""
+        is_restarted = number < self.number
         self.heard = now
         self.beats = True
+        self.number = number
+        return is_restarted
 
     def answered(self, now: float) -> None:
         """Note an answer to a request."""

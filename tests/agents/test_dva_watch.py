@@ -21,13 +21,13 @@ ROBOT = id_of("robot", 1)
 
 def test_the_dva_is_silent_only_after_its_time_has_passed():
     watch = DvaWatch()
-    watch.beat(5.0)
+    watch.beat(5.0, 1)
     assert not watch.look(5.0 + SILENT_AFTER)
     assert not watch.silent
     assert watch.look(5.1 + SILENT_AFTER)
     assert watch.silent
     assert watch.silence(17.0) == 12.0
-    watch.beat(18.0)
+    watch.beat(18.0, 2)
     assert watch.look(18.0)
     assert not watch.silent
 
@@ -45,12 +45,17 @@ def test_a_dva_that_has_never_published_a_heartbeat_is_judged_by_its_answers_alo
 
 def test_a_heartbeat_does_not_make_up_for_a_request_that_was_not_answered():
     watch = DvaWatch()
-    watch.beat(1.0)
+    watch.beat(1.0, 1)
     watch.failed()
     assert watch.look(2.0)
-    watch.beat(3.0)
+    watch.beat(3.0, 2)
     assert not watch.look(3.0)
     assert watch.silent
+
+
+def test_heartbeats_that_are_counted_from_one_again_show_a_restart():
+    watch = DvaWatch()
+    assert [watch.beat(float(n), n) for n in (7, 8, 8, 2, 3)] == [False, False, False, True, False]
 
 
 # --- in a run ------------------------------------------------------------------------------

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from dva_sim.core.registry import Registry
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import PEER
+
+FIRST_EPOCH: Final = 1
 
 
 class Claim(NamedTuple):
@@ -42,7 +44,7 @@ class Division:
 
     def __post_init__(self) -> None:
         for region, dvas in self.lines.items():
-            self.claims.setdefault(region, Claim(1, dvas[0]))
+            self.claims.setdefault(region, Claim(FIRST_EPOCH, dvas[0]))
 
     @property
     def peers(self) -> tuple[str, ...]:

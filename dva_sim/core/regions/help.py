@@ -87,6 +87,9 @@ class MutualHelp:
         """Take an order of another DVA, if somebody is free."""
         if order.task != "confirm" or order.device is not None:
             return DvaAnswer(m.NOT_SUPPORTED, "a DVA helps to look, by whom it chooses")
+        known = next((n for n, lent in self.copies.items() if lent.number == order.event_id), None)
+        if known is not None:  # who asks may have taken the event over
+            self.copies[known] = Lent(asker, order.event_id)
         if self.copy_of(asker, order.event_id) is not None:
             return DvaAnswer()
         if not self.dispatcher.situations.idle(now):

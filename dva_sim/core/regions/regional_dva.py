@@ -10,7 +10,7 @@ from dva_sim.core.dva import Dva
 from dva_sim.core.event_status import status_of
 from dva_sim.core.events import Event, State, apart
 from dva_sim.core.regions.borders import Borders
-from dva_sim.core.regions.division import Claim, Division
+from dva_sim.core.regions.division import FIRST_EPOCH, Claim, Division
 from dva_sim.core.regions.help import MutualHelp
 from dva_sim.core.regions.leases import Leases
 from dva_sim.core.regions.returns import Returns
@@ -107,8 +107,10 @@ class RegionalDva(Dva):
             return self.dismiss(send.to, now)
         if isinstance(send.body, m.GiveBack):
             claim = Claim(send.body.epoch or 0, send.to)
-            is_news = self.division.learn(send.body.region, claim)
-            return self._with_revocations(self._yields([send.body.region], now) if is_news else [])
+            region = send.body.region
+            if self.division.learn(region, claim):
+                return self._with_revocations(self._yields([region], now))
+            return self.deputy.return_copies(send.to, {region: claim.epoch}, now)
         if isinstance(send.body, m.EventReport) and send.body.event_id is None:
             return self._with_revocations(self.strays.taken(send, now))
         return super().delivered(send, now, content)
@@ -153,7 +155,8 @@ class RegionalDva(Dva):
         if is_new and isinstance(body, m.Registration) and body.device_type == PEER:
             self._deputies.clear()
             self.deputy.replace_restarted(message.source, now)
-            returned = self.deputy.return_copies(message.source, now)
+            known = dict.fromkeys(self.division.lines, FIRST_EPOCH)
+            returned = self.deputy.return_copies(message.source, known, now)
             answer = super()._answer(message, now)
             return replace(answer, sends=[*answer.sends, *returned])
         if is_new and entry is None:
@@ -161,8 +164,13 @@ class RegionalDva(Dva):
             answer = super()._answer(message, now)
             self.deputy.spare(message.source, now)
             return answer
-        if isinstance(body, m.EventReport) and body.event_id is None:
-            self.deputy.reported(message.source, self.division.region_at(body.position))
+        match body:
+            case m.EventReport(event_id=None, position=place):
+                self.deputy.reported(message.source, self.division.region_at(place))
+            case m.EventReport(event_id=int(number)):
+                self.deputy.let_go(message.source, number)
+            case m.OrderProgress(event_id=number, state="declined" | "failed" | "done"):
+                self.deputy.let_go(message.source, number)
         if isinstance(body, m.GetGrant) and entry is not None and entry.kind == ROBOT:
             self.leases.bring(message.source, body, message.session or 0, now)
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):
@@ -232,7 +240,12 @@ class RegionalDva(Dva):
         learned = [self.division.learn(*claim) for claim in claims]
         lost = sorted(before.keys() - dict(self.division.served()).keys())
         sends = self.help.unheard.pop(peer, [])
-        sends += self.deputy.return_copies(peer, now) if any(learned) else []
+        known = {region: claim.epoch for region, claim in claims}
+        has_forgotten = any(
+            claim < self.division.claims.get(region, claim) for region, claim in claims
+        )
+        if any(learned) or has_forgotten:
+            sends += self.deputy.return_copies(peer, known, now)
         return sends + (self._yields(lost, now) if lost else [])
 
     def _yields(self, regions: list[str], now: float) -> list[Send]:

@@ -67,8 +67,9 @@ class Returns:
         if body.epoch <= claim.epoch and claim != Claim(body.epoch, dva):
             return DvaAnswer(m.STALE, f"the epoch of {body.region} is {claim.epoch}")
         self.division.claims[body.region] = Claim(body.epoch, dva)
-        self.deputy.copies.pop(body.region, None)  # what is open is passed on
-        self.orders.counters["region taken back"] += claim.dva != dva
+        if claim.dva != dva:
+            self.deputy.copies.pop(body.region, None)  # what is open is passed on
+            self.orders.counters["region taken back"] += 1
         return DvaAnswer()
 
     def yielded(self, regions: list[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
@@ -70,11 +71,24 @@ class Deputy:
             copies[number] = Copy(body.event, now)
         return DvaAnswer()
 
-    def return_copies(self, peer: str, now: float) -> list[Send]:
-        """Return the copies that a DVA needs which was started again, before it was replaced."""
+    def return_copies(self, peer: str, known: Mapping[str, int], now: float) -> list[Send]:
+        """Return the copies that a DVA needs which was started again, before it was replaced.
+
+        Args:
+            peer: The DVA.
+            known: Epochs by which it serves regions, as it knows. A region that was given back
+                to it has a higher one, which it is told first: copies of that are not its own.
+            now: Time [s].
+        """
         sends: list[Send] = []
         for region, (epoch, dva) in self.division.claims.items():
-            for copy in self.copies.get(region, {}).values() if dva == peer else ():
+            if dva != peer or region not in known:
+                continue
+            if epoch > known[region]:
+                is_home = peer == self.division.lines[region][0]
+                sends += [Send(peer, m.GiveBack(region, epoch))] if is_home else []
+                continue
+            for copy in self.copies.get(region, {}).values():
                 passed = now - copy.told
                 age = sent_time(copy.status.age + passed)
                 state_for = sent_time(copy.status.state_for + passed)
@@ -118,6 +132,14 @@ class Deputy:
         entry = self.orders.registry.entries.get(device)
         if entry is not None and any(device in self._sent(copy.status) for copy in copies):
             entry.free_from = now + COME_WITHIN
+
+    def let_go(self, device: str, number: int) -> None:
+        """Note that a device has ended its work at a copied event, whose DVA never heard of it."""
+        for copies in self.copies.values():
+            copy = copies.get(number)
+            if copy is not None and device in self._sent(copy.status):
+                nobody = replace(copy.status, responder=None, operator=None, actor=None)
+                copies[number] = copy._replace(status=nobody)
 
     def reported(self, device: str, region: str) -> None:
         """Note a report about a region: a detector that has come here may be of that region."""
@@ -179,8 +201,9 @@ class Deputy:
         return [device for device in every if device is not None]
 
     def _is_there(self, device: str) -> bool:
+        """Return True for a device that goes on here; a DVA that helps has to be asked again."""
         entry = self.orders.registry.entries.get(device)
-        return entry is not None and not entry.silent
+        return entry is not None and not entry.silent and entry.kind != PEER
 
     def _go_on(self, copy: Copy, are_back: bool, now: float) -> None:
         status = copy.status
@@ -188,7 +211,7 @@ class Deputy:
         if events.get(status.event_id) is not None or self._is_looked_at(status):
             return
         state = State(status.event_state.replace("_", " "))
-        if not are_back and state in LOOKING:
+        if state in LOOKING and not (are_back and status.responder):
             state = State.PENDING
         event = Event(
             status.event_id,

@@ -156,6 +156,10 @@ class RegionalDvaAgent(DvaAgent):
         if peer is not None:
             self._pass_on(request, message, peer)
             return None
+        return self._decide(request, message)
+
+    def _decide(self, request: Request, message: m.Message) -> m.Reply | None:
+        """Answer here; a new report waits for its copy."""
         reply = super()._on_request(message)
         is_new = isinstance(message.body, m.EventReport) and message.body.event_id is None
         if not is_new or reply is None or reply.code != m.OK:
@@ -177,7 +181,7 @@ class RegionalDvaAgent(DvaAgent):
             if not is_over and not self.is_gone:
                 self.device.recorder.counters["reports kept for another DVA"] += 1
                 self._request = request
-                conclude(DvaAgent._on_request(self, message))
+                conclude(self._decide(request, message))
 
         def answered(reply: m.Reply) -> None:
             if is_over:

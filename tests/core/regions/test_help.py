@@ -4,6 +4,7 @@ from helpers.dva.dispatch_office import DETECTOR, GUARD, OTHER_GUARD, east
 from helpers.dva.two_offices import EAST, WEST, Street
 
 from dva_sim.core.events import State
+from dva_sim.core.regions.help import Lent
 from dva_sim.protocol import messages as m
 
 
@@ -67,6 +68,15 @@ def test_the_finding_of_who_was_lent_is_that_of_the_helper_and_all_are_free_agai
     assert not street.cores[WEST].orders.engaged
     assert not street.cores[EAST].orders.engaged
     assert not street.cores[EAST].help.copies
+
+
+def test_who_takes_an_event_over_is_helped_by_those_who_are_on_the_way_already():
+    street = lent()
+    third = "02:00:00:00:00:03"
+    street.register(EAST, third, "DVA")
+    assert street.say(EAST, third, m.Order(1, "fire", east(10), None)).code == m.OK
+    assert street.cores[EAST].help.copies == {1_000_001: Lent(third, 1)}
+    assert len(street.told(GUARD, m.Order)) == 1
 
 
 def test_help_that_is_needed_no_longer_comes_back():

@@ -151,3 +151,28 @@ def test_an_answer_that_is_lost_is_made_up_for_by_the_next_status():
     street.tick(12, GUARD, OPERATOR, ROOM)
     assert claims(street) == [Claim(3, WEST)] * 2
     assert street.told(OPERATOR, m.HandOver)
+
+
+def test_a_dva_that_was_given_its_region_back_and_is_started_again_hears_its_epoch_first():
+    street = back()
+    street.say(EAST, ROOM, ASKED)
+    status = m.EventStatus(7, "fire", east(10), 0.8, 0.9, "pending", 20.0, 5.0, 1)
+    assert street.say(EAST, WEST, m.Replicate("west", 3, 1, status)).code == m.OK
+    street.cores[WEST] = street.new_core(WEST, life=1)
+    street.register(WEST, EAST, "DVA")
+    street.number = 0
+    street.register(EAST, WEST, "DVA")
+    assert street.cores[WEST].division.claims["west"] == Claim(3, WEST)
+    assert [copy.epoch for copy in street.told(WEST, m.Replicate)] == [3]
+    street.tick(5)
+    assert list(street.cores[WEST].events.open) == [7]
+    assert claims(street) == [Claim(3, WEST)] * 2
+
+
+def test_a_dva_that_says_an_epoch_that_is_over_is_told_the_present_one():
+    street = back()
+    street.say(EAST, ROOM, ASKED)
+    street.cores[WEST].division.claims["west"] = Claim(1, WEST)
+    street.tick(3, GUARD, OPERATOR, ROOM)
+    assert claims(street) == [Claim(3, WEST)] * 2
+    assert street.cores[WEST].counters["region taken back"] == 1

@@ -153,6 +153,39 @@ def test_a_dva_that_was_started_again_gets_its_events_back_with_their_ages():
     assert event.times["detected"] == pytest.approx(2.0 - 20.0)
 
 
+@pytest.mark.parametrize(
+    ("device", "ended"),
+    [
+        (GUARD, m.EventReport(7, "fire", east(10), 0.5, 0.9, "refuted")),
+        (GUARD, m.OrderProgress(7, "done")),
+        (GUARD, m.OrderProgress(7, "failed")),
+    ],
+)
+def test_an_event_whose_responder_has_ended_before_the_takeover_is_open_again(device, ended):
+    street = dead_west("on_scene", responder=GUARD)
+    street.say(EAST, device, ended)
+    street.tick(5, GUARD)
+    event = street.cores[EAST].events.open[7]
+    assert street.told(GUARD, m.Order) == [m.Order(7, "fire", east(10), None)]
+    assert event.state is State.ASSIGNED
+
+
+@pytest.mark.parametrize(
+    ("device", "said"),
+    [
+        (GUARD, m.OrderProgress(7, "arrived")),
+        (OTHER_GUARD, m.OrderProgress(7, "done")),
+    ],
+)
+def test_an_event_is_its_responders_while_that_one_does_not_say_that_it_has_ended(device, said):
+    street = dead_west("on_scene", responder=GUARD)
+    street.guard(EAST, OTHER_GUARD, 80)
+    street.say(EAST, device, said)
+    street.tick(2, GUARD, OTHER_GUARD)
+    event = street.cores[EAST].events.open[7]
+    assert (event.state, event.responder) == (State.ON_SCENE, GUARD)
+
+
 def test_no_two_lives_of_a_dva_give_an_event_the_same_number():
     street = Street()
     street.cores[EAST] = street.new_core(EAST, life=2)

@@ -86,7 +86,7 @@ def test_a_report_that_the_other_dva_does_not_take_within_three_seconds_is_kept_
     run.clock.run(4.9)
     assert answers == []
     run.clock.run(5.5)
-    assert [reply.code for reply in answers] == [m.OK]
+    assert [(reply.code, reply.text) for reply in answers] == [(m.OK, "unreplicated")]
     assert open_events(run, WEST) == [1]
 
 
@@ -285,6 +285,19 @@ def test_a_permission_holds_at_the_deputy_while_its_drive_goes_on():
     run.clock.run(200.0)
     assert [drive.outcome for drive in run.recorder.drives] == ["confirmed"]
     assert not run.dvas[EAST].core.sessions.permissions.grants
+    assert not run.recorder.broken
+
+
+def test_a_robot_tells_its_dva_who_drives_it_if_that_one_was_started_again():
+    again = {"region": "west", "at_s": 12.0, "back_after_s": 3.0}
+    run = hall(control="direct", events__0__position=[10, 20], dva__deaths=[again])
+    run.clock.run(11.0)
+    robot = next(iter(run.field.robots.values()))
+    session = robot.controller.grant.session
+    run.clock.run(20.0)
+    assert robot.device.dva == WEST
+    grants = run.dvas[WEST].core.sessions.permissions.grants
+    assert grants[id_of("robot", 1)].session == session
     assert not run.recorder.broken
 
 
