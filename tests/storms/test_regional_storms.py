@@ -33,6 +33,12 @@ def test_no_event_goes_to_a_dva_that_was_started_again_and_forgot_its_region():
     assert play(draw_regions(70_001)).is_clean
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", [110, 303, 372, 395, 485])
+def test_storms_that_broke_a_rule_once_break_none(seed):
+    assert play(draw_regions(seed)).is_clean
+
+
 def test_a_supervisor_in_a_storm_gives_a_region_back_whose_dva_was_killed():
     plan = next(p for p in map(draw_regions, range(1, 20)) if "part-3" not in p.built().dva.regions)
     killed = Fault(KILLED, 20.0, target="dva-part-1", value=30.0)

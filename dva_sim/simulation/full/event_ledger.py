@@ -27,7 +27,7 @@ LOST_BY_RESTART = 1.0  # a killed DVA continues from the time of its last write 
 INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
-RETURNED_WITHIN = 8.0  # time in which a regional DVA gets its events back from its deputy [s]
+RETURNED_WITHIN = 8.0  # time after contact until a restarted DVA has its events back [s]
 SIMULTANEOUS_S = 20.0  # deaths of DVAs within this time are simultaneous: copies take a while [s]
 HEARD_LATE = 25.0  # longest delay of a reported position over a bad link [s]
 STIRRED = 0.25  # least distance that counts as a move: half of the DVA's own limit [m]
@@ -156,6 +156,7 @@ class EventLedger:
         self._uninformed: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._taken: list[m.EventReport] = []
+        self._unjudged: list[m.EventReport] = []
         self._unreplicated: list[m.EventReport] = []
         self._orders: dict[tuple[str, int], int] = {}
         self._called_false: dict[tuple[str, int], int] = {}
@@ -171,6 +172,7 @@ class EventLedger:
         self._was_down = False
         self._back_at = -math.inf
         self._down_at = -math.inf
+        self._alone_at = -math.inf
         self._not_kept = 0.0
 
     # --- messages ------------------------------------------------------------------------
@@ -340,9 +342,11 @@ class EventLedger:
             self._is_new = False
             self._adopt(now)
             last = -math.inf
-        for report in self._taken:
+        judged = self._taken if len(self._books) < 2 else self._unjudged
+        self._unjudged = self._taken  # by the next check, the books of all DVAs are as new
+        self._taken = []
+        for report in judged:
             yield from self._listed(report)
-        self._taken.clear()
         if sum(events.counts.values()) != events.total:
             yield "S6", f"{events.total} events, but {sum(events.counts.values())} in some state"
         if min(events.counts.values()) < 0:
@@ -362,7 +366,9 @@ class EventLedger:
             yield "S6", f"event {number} is open and closed"
         gone = self._open.keys() - events.open.keys() - events.closed.keys()
         gone = {n for n in gone if not self._may_be_gone(n, *self._open[n])}
-        returns = now - self._back_at < RETURNED_WITHIN
+        if any(not self._meets(book) for book in self._books):
+            self._alone_at = now
+        returns = now - max(self._back_at, self._alone_at) < RETURNED_WITHIN
         later = {number: self._open[number] for number in gone if returns}
         for number in gone - later.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
@@ -381,7 +387,7 @@ class EventLedger:
         self._seen = {}
         for event in every:
             old = past.get(event.number)
-            if old is None and last > -math.inf and self._was_known(event.number):
+            if old is None and self._was_known(event.number) and last > -math.inf:
                 old = self._adopted(event, now)
             if old is not None and old.is_over and not event.open and old.times == event.times:
                 self._seen[event.number] = old
@@ -471,6 +477,11 @@ class EventLedger:
         all_events: list[Event | m.EventReport] = [*self._unreplicated]
         all_events += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
         return any(e.kind == kind and apart(e.position, place) < near for e in all_events)
+
+    def _meets(self, book: EventLedger) -> bool:
+        """Return True if this DVA and another have heard each other since this one is back."""
+        heard = self._heard.get(book._dva, -math.inf), book._heard.get(self._dva, -math.inf)
+        return book is self or book._was_down or min(heard) >= self._back_at
 
     def _worked_since(self, time: float) -> bool:
         return not self._was_down and self._back_at < time
@@ -602,7 +613,8 @@ class EventLedger:
         if word.sent_again or hands != old.hands:
             word.taken -= word.loose  # the new order may still wait in the DVA's queue
         # A restarted DVA knows which devices have set out; those that register again continue.
-        under_way = ("act_departed" if hands[:1] == ("act",) else "departed") in event.times
+        act = "act_" if hands[:1] == ("act",) else ""
+        under_way = any(act + step in event.times for step in ("departed", "arrived"))
         taken = bool(word.taken.intersection(hands)) or (bool(hands) and under_way)
         confirmed = "confirmed" in conclusions - old.found
         waits = now if taken or word.busy or confirmed else old.waits

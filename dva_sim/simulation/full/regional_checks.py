@@ -22,11 +22,11 @@ OBEYS_WITHIN: Final = 5.0  # delay allowed between an order and its first effect
 HEALS_WITHIN: Final = 30.0  # time in which two DVAs that hear each other have to agree [s]
 HEARD_WITHIN: Final = 6.0  # a DVA heard within this time counts as reachable now [s]
 SHOWN_WITHIN: Final = 5.0  # a DVA whose table was not seen for this long is dead [s]
-PASSED_WITHIN: Final = 0.9  # time in which an event that was passed on is in the other table [s]
+PASSED_WITHIN: Final = 0.9  # time in which what a DVA has taken from another is in its table [s]
 GOES_ON_WITHIN: Final = (
     15.0  # time after a takeover in which a dead DVA's events are open again [s]
 )
-COMES_BACK_WITHIN: Final = 60.0  # time after an event in which lent responders are free [s]
+COMES_BACK_WITHIN: Final = 15.0  # time after an event in which lent responders are free [s]
 MAX_MOVE_M: Final = 25.0  # maximum distance by which an event is moved to where it is seen [m]
 MAX_KEPT: Final = 1000
 
@@ -40,7 +40,8 @@ CHECKED: Final = {
     "S14": "DVAs that hear each other do not both serve one region, nor both look at one event "
     f"of a region; slack: {HEALS_WITHIN:g} s",
     "S15": "nobody looks at an event for a DVA whose event is over, or that has sent somebody "
-    f"else; slack: {COMES_BACK_WITHIN:g} s",
+    f"else; slack: {COMES_BACK_WITHIN:g} s; a DVA that has promised help has the event in its "
+    f"book {PASSED_WITHIN:g} s later",
 }
 """Checks of each rule, made at every message and twice a second."""
 
@@ -56,9 +57,9 @@ Key = tuple[str, str, int]  # who was asked by whom, and the number of the reque
 
 
 class Asked(NamedTuple):
-    """An order that has reached a device: when, and whom it obeyed then."""
+    """An order that has reached a device: when it was sent, and whom the device obeyed then."""
 
-    time: float
+    timestamp: str
     obeyed: str | None
 
 
@@ -89,6 +90,8 @@ class RegionalRules:
     _promises: list[KeptReport] = field(default_factory=list)
     _claimed: dict[str, tuple[str, float]] = field(default_factory=dict)  # by region
     _sends: list[tuple[str, m.Order, float]] = field(default_factory=list)
+    _requests: OrderedDict[Key, m.Order] = field(default_factory=OrderedDict)
+    _promised_help: list[tuple[str, m.Order, float]] = field(default_factory=list)
     _pages: dict[str, Page] = field(default_factory=dict)
     _died: dict[str, float] = field(default_factory=dict)  # of those that are dead
     _down: dict[str, float] = field(default_factory=dict)  # when each was last seen dead
@@ -120,8 +123,11 @@ class RegionalRules:
             if self._registers.pop((to, source, body.answers), ()) is None and body.code == m.OK:
                 self._obeys[to] = source
         elif source in self.terms.dvas and isinstance(body, ORDERS):
-            self._ordered[to, source, message.message_id] = Asked(now, self._obeys.get(to))
-        for table in (self._registers, self._ordered, self._reported):
+            key = to, source, message.message_id
+            order = self._ordered.get(key)
+            if order is None or order.timestamp != message.timestamp:  # others are repetitions
+                self._ordered[key] = Asked(message.timestamp, self._obeys.get(to))
+        for table in (self._registers, self._ordered, self._reported, self._requests):
             if len(table) > MAX_KEPT:
                 table.popitem(last=False)
 
@@ -132,7 +138,7 @@ class RegionalRules:
         elif to in self.terms.dvas and b"<reply>" in payload and self._ordered:
             message = decode_if_valid(payload)
             if message is not None and isinstance(message.body, m.Reply):
-                order = self._ordered.pop((source, to, message.body.answers), None)
+                order = self._ordered.get((source, to, message.body.answers))
                 candidates = [] if order is None else [order.obeyed, self._obeys.get(source)]
                 obeyed = [dva for dva in candidates if dva is not None]
                 if message.body.code == m.OK and obeyed and to not in obeyed:
@@ -146,7 +152,12 @@ class RegionalRules:
         match message.body if message is not None else None:
             case m.Order() as order if to not in self.terms.dvas:
                 self._sends.append((dva, order, now))
+            case m.Order() as request if message is not None:
+                self._requests[dva, to, message.message_id] = request
             case m.Reply(code=m.OK, answers=number, text=text):
+                if (to, dva, number) in self._requests:
+                    requested = self._requests.pop((to, dva, number))
+                    self._promised_help.append((dva, requested, now))
                 report = self._reported.pop((to, dva, number), None)
                 is_kept = report is not None and text != UNREPLICATED
                 if report is not None and is_kept and report.finding == "detected":
@@ -183,6 +194,7 @@ class RegionalRules:
             yield from self._of_passed_on(page, now)
             yield from self._of_others(page, now)
             yield from self._of_help(page, now)
+            yield from self._of_promised_help(page, now)
 
     def _note_dead(self, now: float, page: Page) -> None:
         """Note the DVAs that decide nothing, or whose book nobody has seen for a while."""
@@ -192,6 +204,11 @@ class RegionalRules:
             self._down[dva] = now
         if page.works:
             self._died.pop(page.dva, None)
+        else:  # with it goes what it has heard and does, until it hears and does it again
+            self._epochs = {key: at for key, at in self._epochs.items() if key[0] != page.dva}
+            self._promised_help = [p for p in self._promised_help if p[0] != page.dva]
+            for rule in ("S14", "S15"):
+                list(self._lasting(rule, page.dva, set(), now))
 
     def _of_the_dead(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield promises of a dead DVA that the one which has taken over does not keep."""
@@ -201,7 +218,7 @@ class RegionalRules:
             dead = self._pages.get(promise.dva)
             if by != page.dva or promise.dva == by or dead is None or promise.dva not in self._died:
                 continue
-            if now - since <= GOES_ON_WITHIN:
+            if now - since <= GOES_ON_WITHIN or region not in page.served:
                 continue
             self._promises.remove(promise)
             died = self._died.get(promise.dva, now) - SIMULTANEOUS_S
@@ -287,6 +304,16 @@ class RegionalRules:
             if now - since > COMES_BACK_WITHIN:
                 what = f"still looks at event {key[2]} for {key[3]}"
                 yield "S15", f"{what}, which needs that no longer"
+
+    def _of_promised_help(self, page: Page, now: float) -> Iterator[Broken]:
+        """Yield help that was promised, and for which nothing is booked."""
+        due = [p for p in self._promised_help if p[0] == page.dva and now - p[2] > PASSED_WITHIN]
+        self._promised_help = [each for each in self._promised_help if each not in due]
+        events = (*page.events.open.values(), *page.events.closed.values())
+        for _, order, _ in due:
+            fits = (e for e in events if e.kind == order.kind)
+            if all(apart(event.position, order.position) >= self._near for event in fits):
+                yield "S15", f"has promised to look at event {order.event_id}, and has none there"
 
     def _lasting(
         self, rule: str, dva: str, conditions: set[tuple[Any, ...]], now: float

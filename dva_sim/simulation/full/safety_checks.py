@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import OrderedDict, deque
+from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -173,7 +173,7 @@ class Witness:
         emergency: Clock of the robot at the newest emergency, as it says [ms].
         reported_at: Time at which it first said that [s].
         questions: Numbers of its newest requests for a release.
-        registrations: Its newest ones, by number and time stamp.
+        registrations: Newest ones at each DVA, by number and time stamp.
         reported: Number of its newest status.
         restarts: Number of restarts of its program that messages have shown.
         restarts_shown: Number of them that each kind of message has shown.
@@ -213,7 +213,9 @@ class Witness:
     emergency: int | None = None
     reported_at: float = -math.inf
     questions: deque[int] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
-    registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MAX_COPIES))
+    registrations: dict[str, deque[tuple[int, str]]] = field(
+        default_factory=lambda: defaultdict(lambda: deque(maxlen=MAX_COPIES))
+    )
 
     def given(self, session: int, right: Held) -> None:
         """Note that the DVA gives a permission, or says that one holds."""
@@ -249,12 +251,13 @@ class Witness:
             self.hand = None
         self.heard = now
 
-    def registers(self, registration: tuple[int, str], now: float) -> None:
-        """Note a registration, unless it is sent again."""
-        if registration not in self.registrations:
-            last = self.registrations[-1][0] if self.registrations else 0
-            self._follows("registration", last, registration[0], now)
-            self.registrations.append(registration)
+    def registers(self, dva: str, registration: tuple[int, str], now: float) -> None:
+        """Note a registration, unless it is sent again; those at one DVA follow each other."""
+        registrations = self.registrations[dva]
+        if registration not in registrations:
+            last = registrations[-1][0] if registrations else 0
+            self._follows(f"registration at {dva}", last, registration[0], now)
+            registrations.append(registration)
 
     def reports(self, number: int, now: float) -> None:
         """Note a status; each goes to several devices."""
@@ -557,7 +560,7 @@ class SafetyAudit:
             witness.offset = offset_of(payload) or witness.offset
             return
         if b"<RegMsg>" in payload and (message := decode_if_valid(payload)) is not None:
-            witness.registers((message.message_id, message.timestamp), now)
+            witness.registers(to, (message.message_id, message.timestamp), now)
         if b"<GetGrant" in payload and (question := decode_if_valid(payload)) is not None:
             witness.asks(question.message_id, now)
         if b"<RobotEmergency>" in payload and (report := decode_if_valid(payload)) is not None:

@@ -180,3 +180,11 @@ def test_a_helper_that_goes_on_when_it_is_told_to_stop_breaks_s15(monkeypatch):
     detector.ask(WEST, m.FalseAlarm(1, "toast", None))
     run.clock.run(100.0)
     assert broken(run) == {"S15"}
+
+
+@pytest.mark.invariant("S15")
+def test_a_dva_that_promises_help_and_books_nothing_breaks_s15(monkeypatch):
+    monkeypatch.setattr(MutualHelp, "give", lambda *_: DvaAnswer())
+    run = hall(events__0__position=[10, 20])
+    run.clock.run(20.0)
+    assert broken(run) == {"S15"}

@@ -518,12 +518,13 @@ def test_a_status_shows_that_a_robot_has_restarted_and_knows_no_holder(number, h
 
 def test_a_restart_counts_once_whichever_message_shows_it_first():
     witness = Witness(obeys_within=1.0)
-    witness.registers((1, "12:00:00"), 0.0)
+    witness.registers("a DVA", (9, "12:00:00"), 0.0)
+    witness.registers("another DVA", (8, "11:59:58"), 0.1)
     witness.asks(2, 0.5)
     witness.reports(100, 1.0)
     witness.asks(2, 1.5)
     assert witness.restarts == 0
-    witness.registers((1, "12:00:05"), 6.0)
+    witness.registers("a DVA", (1, "12:00:05"), 6.0)
     witness.asks(2, 6.0)
     assert witness.restarts == 1
     confirmed(witness, 7)
