@@ -143,12 +143,13 @@ def console(options: ConsoleOptions, quiet: Quiet = False, verbose: Verbose = Fa
     has_token = not options.no_token
     has_keys = options.keys is not None
     if options.dva is not None:
-        from dva_sim.console.remote.options import check, listening_address  # late: start-up
+        from dva_sim.console.remote.options import check  # late: start-up
         from dva_sim.console.remote.supervisor import attach  # late: start-up
+        from dva_sim.network.addresses import address_towards  # late: start-up
 
         check(options)
         exposure.warn_of_pages([options.host], has_token=has_token)
-        listens = [listening_address(options.dva)]
+        listens = [address_towards(options.dva)]
         exposure.warn_of_devices(listens, has_keys=has_keys, close_by=_CLOSED)
         attach(options, _say_at_once)
         return

@@ -11,7 +11,7 @@ import typer
 
 from dva_sim.cli.options import Quiet
 from dva_sim.kernel.errors import ConfigError, ExitCode
-from dva_sim.options.forms import Jobs, OptionForm, argument, out_form
+from dva_sim.options.forms import Jobs, OptionForm, Scheduler, argument, out_form
 
 if TYPE_CHECKING:
     from dva_sim.storms.campaign import StormTally
@@ -37,6 +37,7 @@ def storm(
         str, OptionForm("Storms of one `team`, or of several DVAs (`regions`).", metavar="PLAY")
     ] = "team",
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     out: Annotated[Path, out_form("Folder for the journal and for failures.")] = STORMS_FOLDER,
     quiet: Quiet = False,
 ) -> None:
@@ -64,7 +65,7 @@ def storm(
         dva-sim storm --plays regions --seeds 1:100  # 10 hours of several DVAs
         dva-sim storm results/storms/found/all-7.yaml  # replay a failure
     """
-    from dva_sim.experiments.execution.executors import local  # late: start-up
+    from dva_sim.experiments.execution.dask_cluster import workers_at  # late: start-up
     from dva_sim.storms.campaign import (  # late: start-up
         REGIONS,
         Journal,
@@ -90,17 +91,18 @@ def storm(
     played_before = 0
     failed: list[StormOutcome] = []
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
-    for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
-        tally.add(outcome)
-        played_before += is_known
-        if not outcome.is_clean:
-            _tell_failure(outcome, profile)
-            failed.append(outcome)
-        if not quiet and not is_known:
-            of = f" of {hours:g}" if hours else ""
-            typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
-        if hours and tally.hours >= hours:
-            break
+    with workers_at(scheduler, jobs) as workers:
+        for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), workers):
+            tally.add(outcome)
+            played_before += is_known
+            if not outcome.is_clean:
+                _tell_failure(outcome, profile)
+                failed.append(outcome)
+            if not quiet and not is_known:
+                of = f" of {hours:g}" if hours else ""
+                typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
+            if hours and tally.hours >= hours:
+                break
     _tell(tally, played_before)
     for outcome in failed:  # last: reducing one takes minutes of a single process
         _keep_failure(drawn(outcome.seed, profile), outcome, out / "found", profile)

@@ -18,8 +18,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.load_devices import LONGEST, LoadShare
+from dva_sim.live.load_devices import LONGEST, LoadShare, make
 from dva_sim.live.supervisor import free_pairs
 from dva_sim.network.addresses import check_address
 from dva_sim.options.runs import LiveOptions, LoadOptions
@@ -264,11 +265,10 @@ def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> L
     count = options.processes
     settle = SETTLE + devices / JOINS_PER_S
     parts = [_part(whole, count) for whole in (devices, options.sessions)]
-    children = []
-    for number, (own, sessions) in enumerate(zip(*parts, strict=True)):
-        share = LoadShare(
+    shares = [
+        LoadShare(
             dva=address,
-            host=options.host,
+            host=options.host if options.scheduler is None else "",
             number=number,
             devices=own,
             sessions=sessions,
@@ -280,16 +280,42 @@ def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> L
             settle=settle,
             seed=options.seed,
         )
-        words = [sys.executable, "-m", "dva_sim.live.load_devices", json.dumps(asdict(share))]
-        pipe = subprocess.PIPE
-        children.append(Child(f"load process {number}", words, stdin=pipe, stdout=pipe))
+        for number, (own, sessions) in enumerate(zip(*parts, strict=True))
+    ]
     before = dva.used_s
+    if options.scheduler is None:
+        every = _made_here(shares)
+    else:
+        every = _made_on_cluster(options.scheduler, shares)
+    looked = dva.look(before, settle + options.duration)
+    return figures_of(options, devices, every, looked)
+
+
+def _made_here(shares: list[LoadShare]) -> list[dict[str, Any]]:
+    """Make the shares in processes of this machine; return the counts of each."""
+    children = []
+    pipe = subprocess.PIPE
+    for share in shares:
+        words = [sys.executable, "-m", "dva_sim.live.load_devices", json.dumps(asdict(share))]
+        children.append(Child(f"load process {share.number}", words, stdin=pipe, stdout=pipe))
     try:
-        every = [json.loads(said(child)) for child in children]
-        looked = dva.look(before, settle + options.duration)
+        return [json.loads(said(child)) for child in children]
     finally:
         end_all(children)
-    return figures_of(options, devices, every, looked)
+
+
+def _made_on_cluster(scheduler: str, shares: list[LoadShare]) -> list[dict[str, Any]]:
+    """Make the shares on the workers of a cluster, one on each; return the counts of each.
+
+    Clocks of machines are apart, so no time from a report here to an order there is known.
+
+    Raises:
+        ConfigError: there are fewer workers than shares.
+    """
+    with DaskCluster(scheduler) as workers, workers.executor(len(shares), make) as executor:
+        workers.wait_for(len(shares))
+        futures = [executor.submit(workers.guarded(make), share) for share in shares]
+        return [future.result() | {"ordered": []} for future in futures]
 
 
 def said(child: Child) -> bytes:

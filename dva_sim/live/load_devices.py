@@ -11,16 +11,17 @@ import sys
 import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from random import Random
-from typing import Final
+from typing import Any, Final
 
 from dva_sim.agents.device import STATUS, AgentDevice
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.open_files import check_room_for
 from dva_sim.live.process import ending_when_asked
+from dva_sim.network.addresses import address_towards
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
@@ -42,7 +43,7 @@ class LoadShare:
 
     Attributes:
         dva: Address of the DVA.
-        host: Address that the devices listen on.
+        host: Address that the devices listen on; empty: one that the DVA can reach.
         number: Number of the process, from 0.
         devices: Number of devices, those in sessions and the detector that reports included.
         sessions: Number of operators who drive a robot each.
@@ -256,22 +257,37 @@ class LoadDevices:
         return m.Reply(message.message_id, m.OK, "")
 
 
-def main(argument: str) -> int:
-    """Make one share of a load until its time is up; its counts go to standard output."""
-    share = LoadShare(**json.loads(argument))
+def make(share: LoadShare, supervised: bool = False) -> dict[str, Any]:
+    """Make one share of a load until its time is up; return its counts, as `LoadCounts`.
+
+    Args:
+        share: The share; without a host, its devices listen where the DVA can reach this machine.
+        supervised: True to end when standard input does.
+
+    Raises:
+        DvaSimError: there are too few open files, or an address is not free.
+    """
+    check_room_for(share.devices)
     network = SocketNetwork(LiveClock())
     try:
-        check_room_for(share.devices)
-        devices = LoadDevices(network, share)
+        devices = LoadDevices(
+            network, replace(share, host=share.host or address_towards(share.dva))
+        )
         devices.begin()
-        with ending_when_asked(network.clock, supervised=True):
+        with ending_when_asked(network.clock, supervised):
             network.clock.run(min(LONGEST, share.settle + share.duration))
-        json.dump(vars(devices.finish()), sys.stdout)
+        return vars(devices.finish())
+    finally:
+        network.close()
+
+
+def main(argument: str) -> int:
+    """Make one share of a load; its counts go to standard output."""
+    try:
+        json.dump(make(LoadShare(**json.loads(argument)), supervised=True), sys.stdout)
     except DvaSimError as error:
         print(error_line(error), file=sys.stderr)
         return error.exit_code
-    finally:
-        network.close()
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Final
 
 from dva_sim.kernel.errors import ConfigError
@@ -40,3 +41,14 @@ def problem_of(text: str) -> str:
     if not 0 < int(port) <= HIGHEST:
         return f"has port {port}; should be from 1 to {HIGHEST}, as the next one is used, too"
     return ""
+
+
+def address_towards(peers: str) -> str:
+    """Return the address at which the first of some peers, `HOST:PORT,...`, finds this machine."""
+    host = peers.split(",")[0].partition(":")[0]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
+        try:
+            way.connect((host, 1))  # nothing is sent by that
+        except OSError:
+            return "127.0.0.1"
+        return str(way.getsockname()[0])

@@ -90,6 +90,10 @@ JOBS = OptionForm(
 Changes = Annotated[tuple[str, ...], CHANGES]
 Settings = Annotated[Mapping[str, Any] | Iterable[str], CHANGES]
 Jobs = Annotated[int | None, JOBS]
+Scheduler = Annotated[
+    str | None,
+    OptionForm("Use a dask.distributed cluster instead.", metavar="tcp://HOST:PORT"),
+]
 Overwrite = Annotated[bool, OptionForm("Overwrite existing files.")]
 RunSeed = Annotated[int, OptionForm("The run's random seed.")]
 SCENARIO = argument("A scenario by name or path.", "SCENARIO", *SCENARIOS)

@@ -16,6 +16,7 @@ from dva_sim.options.forms import (
     Overwrite,
     RunSeed,
     ScenarioName,
+    Scheduler,
     Settings,
     argument,
     out_form,
@@ -349,6 +350,7 @@ class LoadOptions:
     processes: Annotated[
         int, OptionForm("Number of processes that make the load.", least=1, most=16)
     ] = 1
+    scheduler: Scheduler = None
     out: Annotated[Path | None, out_form("Save the figures: X.csv.", "FILE")] = None
     overwrite: Overwrite = False
     seed: RunSeed = 1

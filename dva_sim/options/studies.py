@@ -8,7 +8,16 @@ from pathlib import Path
 from typing import Annotated, Literal, Protocol
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.options.forms import AnyPath, Jobs, OptionForm, Overwrite, Settings, argument, out_form
+from dva_sim.options.forms import (
+    AnyPath,
+    Jobs,
+    OptionForm,
+    Overwrite,
+    Scheduler,
+    Settings,
+    argument,
+    out_form,
+)
 
 
 class InFolder(Protocol):
@@ -43,14 +52,7 @@ class RunOptions:
         int | None, OptionForm("Random seed of the whole study.", "In place of its own.")
     ] = None
     jobs: Jobs = None
-    scheduler: Annotated[
-        str | None,
-        OptionForm(
-            "Use a dask.distributed cluster instead.",
-            "Its address; recordings are made here.",
-            metavar="tcp://HOST:PORT",
-        ),
-    ] = None
+    scheduler: Scheduler = None
     limit_s: Annotated[
         float,
         OptionForm(

@@ -141,13 +141,14 @@ def outcomes(
         workers: Workers that run the storms.
     """
     waiting = set[Future[StormOutcome]]()
+    task = workers.guarded(play_seed)
     with workers.executor(workers.width, play_seed) as executor:
         for seed in seeds:
             outcome = journal.outcomes.get((profile, seed))
             if outcome is not None:
                 yield outcome, True
                 continue
-            waiting.add(executor.submit(play_seed, seed, profile))
+            waiting.add(executor.submit(task, seed, profile))
             while len(waiting) >= 2 * workers.width:
                 yield from _ended(waiting, profile, journal, workers)
         while waiting:

@@ -1,13 +1,17 @@
 """Load on a DVA: what counts as broken, and a small load on one that is started for it."""
 
 import csv
+import json
 import math
 import subprocess
 import sys
 
 import pytest
 from helpers.processes.command_line import call
+from helpers.studies.dask_cluster import DaskCluster
+from helpers.wording import unnamed
 
+from dva_sim.experiments.execution import dask_cluster
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.load import LoadedDva, figures_of, order_times, said
 from dva_sim.live.load_devices import LoadCounts
@@ -72,3 +76,21 @@ def test_a_small_load_is_answered_by_a_dva_that_is_started_for_it(tmp_path):
     assert 0 < float(row["orders_p50_s"]) < 30
     assert float(row["files"]) > 50
     assert (row["lost"], row["refused"], row["broke"]) == ("0", "0", "")
+
+
+@pytest.mark.system
+def test_workers_of_a_cluster_make_a_load_and_its_figures_but_those_of_two_clocks(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(dask_cluster, "_CONNECT_S", 2.0)
+    with DaskCluster(tmp_path) as dask:
+        options = ["--devices", "20", "--sessions", "2", "--for", "2", "--processes", "2"]
+        scheduler = ["--scheduler", dask.address]
+        dask.add_worker()
+        refused = call("load", *options, *scheduler)
+        assert unnamed(refused.stderr, "1 workers", "2 are needed") == []
+        dask.add_worker()
+        (figures,) = json.loads(call("load", *options, *scheduler, "--json").stdout)
+    assert (figures["joined"], figures["lost"], figures["broke"]) == (20, 0, "")
+    assert figures["messages_per_s"] > 40
+    assert figures["orders_p50_s"] is None

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 from helpers.processes.command_line import ended
+from helpers.studies.dask_cluster import DaskCluster
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.executors import local
 from dva_sim.kernel.recorder import Breach
@@ -94,3 +96,18 @@ def test_failures_are_reduced_at_the_end_and_once(tmp_path, monkeypatch):
     (found / "none-1.yaml").unlink()  # as if it had been killed while it reduced
     assert ended(*words)[0] == 1
     assert steps[5:] == ["reduced 1", "played 1"]
+
+
+@pytest.mark.system
+def test_storms_on_a_cluster_are_those_of_one_process(tmp_path):
+    seeds = ["--seeds", "3:3", "--plays", "regions"]
+    assert ended("storm", *seeds, "-j", "1", "-o", tmp_path / "here")[0] == 0
+    with DaskCluster(tmp_path) as dask:
+        dask.add_worker()
+        assert ended("storm", *seeds, "--scheduler", dask.address, "-o", tmp_path / "there")[0] == 0
+        code, _, told = ended("storm", *seeds, "--scheduler", dask.address, "-j", "2")
+    assert (code, unnamed(told, "processes", "scheduler")) == (2, [])
+    here, there = (Journal(tmp_path / name / "storms.jsonl") for name in ("here", "there"))
+    digests = {key: outcome.digest for key, outcome in here.outcomes.items()}
+    assert {key: outcome.digest for key, outcome in there.outcomes.items()} == digests
+    assert len(digests) == 1

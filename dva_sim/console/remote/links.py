@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import AgentDevice, do_nothing
-from dva_sim.console.remote.options import listening_address, own_ids, seat_ids
+from dva_sim.console.remote.options import own_ids, seat_ids
 from dva_sim.console.run.real_links import start_of_day
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.options import addresses_of
+from dva_sim.network.addresses import address_towards
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import PacedClock
@@ -111,7 +112,7 @@ def over_sockets(options: ConsoleOptions, own: str | None = None) -> RemoteLinks
     network = SocketNetwork(clock, ring, note)
     for dva, at in dvas.items():
         network.introduce(dva, at)
-    host = listening_address(dvas[DVA])
+    host = address_towards(dvas[DVA])
     address = network.join(first, host)
     return RemoteLinks(
         clock=clock,

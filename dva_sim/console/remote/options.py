@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import socket
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -15,7 +14,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.options import addresses_of, changes_of, check_count
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.sockets import split_address
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.simulation.full.stage import id_of, kind_of
 from dva_sim.simulation.scenario import Scenario, build, load
@@ -23,16 +21,6 @@ from dva_sim.simulation.scenario import Scenario, build, load
 ROOM = "control-room"
 SEAT = "console"
 FIRST_FREE = 1001  # numbers of control rooms that no scenario gives, for who has no key
-
-
-def listening_address(dvas: str) -> str:
-    """Return the address at which the first of some DVAs finds the console's own device."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
-        try:
-            way.connect(split_address(dvas.split(",")[0]))  # nothing is sent by that
-        except OSError:
-            return "127.0.0.1"
-        return str(way.getsockname()[0])
 
 
 def check(options: ConsoleOptions) -> None:

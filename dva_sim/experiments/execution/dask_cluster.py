@@ -25,7 +25,13 @@ from typing import Any, ParamSpec, TypeVar
 
 from typing_extensions import override
 
-from dva_sim.experiments.execution.executors import WorkerDied, WorkerProcess, Workers, WorkersLost
+from dva_sim.experiments.execution.executors import (
+    WorkerDied,
+    WorkerProcess,
+    Workers,
+    WorkersLost,
+    local,
+)
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
@@ -86,6 +92,19 @@ class DaskCluster(Workers):
     def width(self) -> int:
         """Workers there are now; a process counts as one, however many threads it has."""
         return max(1, len(self._workers() or ()))
+
+    def wait_for(self, workers: int) -> None:
+        """Wait until there are so many workers.
+
+        Raises:
+            ConfigError: there are fewer, and no more have come for some seconds.
+        """
+        try:
+            self._client.wait_for_workers(workers, timeout=_CONNECT_S)
+        except TimeoutError:
+            raise ConfigError(
+                f"the scheduler at {self.address} has {self.width} workers; {workers} are needed"
+            ) from None
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
@@ -186,6 +205,19 @@ def _knock(address: str) -> None:
             reason = "" if kind == "Scheduler" else f"it is a {kind}"
     if reason:
         raise ConfigError(f"no scheduler answers at {address}: {reason}")
+
+
+def workers_at(scheduler: str | None, jobs: int | None) -> Workers:
+    """Return the workers of a scheduler, or processes of this machine.
+
+    Raises:
+        ConfigError: both are given, there are less than one, or no scheduler answers.
+    """
+    if scheduler is None:
+        return local(jobs)
+    if jobs is not None:
+        raise ConfigError("give the number of processes or a scheduler, not both")
+    return DaskCluster(scheduler)
 
 
 async def _kind_at(address: str) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 
 from dva_sim.experiments.execution import executors, scheduling
 from dva_sim.experiments.execution.checkpoint import Checkpoint
-from dva_sim.experiments.execution.dask_cluster import DaskCluster
+from dva_sim.experiments.execution.dask_cluster import workers_at
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.folder_lock import FolderLock
@@ -212,9 +212,7 @@ def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterat
                 "--jobs and --scheduler"
             )
         jobs = 1
-    if scheduler is not None and jobs is not None:
-        raise ConfigError("give the number of processes or a scheduler, not both")
-    with executors.local(jobs) if scheduler is None else DaskCluster(scheduler) as workers:
+    with workers_at(scheduler, jobs) as workers:
         yield workers
 
 
