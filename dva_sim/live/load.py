@@ -23,8 +23,10 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.load_devices import LONGEST, LoadShare, make
 from dva_sim.live.supervisor import free_pairs
 from dva_sim.network.addresses import check_address
+from dva_sim.network.keys import create_keys
 from dva_sim.options.runs import LiveOptions, LoadOptions
 from dva_sim.serving.processes import Child, end_all
+from dva_sim.simulation.full.stage import DVA, id_of
 
 SCENARIO: Final = "drive-to-event"  # whose site the DVA that is started knows
 SETTLE: Final = 3.0  # design: for all to join, and more for many [s]
@@ -204,14 +206,16 @@ def run_load(options: LoadOptions) -> Iterator[LoadFigures]:
         ChildFailed: a process ended by itself.
     """
     check(options)
+    devices = options.devices
+    _make_keys(options, devices)  # first: who starts with a key is known at once
     with _dva(options) as (address, dva):
-        devices = options.devices
         while True:
             figures = _step(options, devices, address, dva)
             yield figures
             if not options.until_it_breaks or figures.broke:
                 return
             devices *= 2
+            _make_keys(options, devices)
 
 
 def check(options: LoadOptions) -> None:
@@ -240,9 +244,10 @@ def _dva(options: LoadOptions) -> Iterator[tuple[str, LoadedDva]]:
         return
     (port,) = free_pairs(1)
     address = f"{options.host}:{port}"
-    run = LiveOptions(SCENARIO, only="dva", no_page=True, dva=address, duration=LONGEST)
+    keys = None if options.keys is None else options.keys.absolute()
+    run = LiveOptions(SCENARIO, only="dva", no_page=True, dva=address, duration=LONGEST, keys=keys)
     part = {"part": "dva", "number": 1, "epoch": None, "outlet": None, "door": ()}
-    about = json.dumps(part | {"options": vars(run)})
+    about = json.dumps(part | {"options": vars(run)}, default=str)
     command = [sys.executable, "-m", "dva_sim.live", about]
     child = Child("the DVA", command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
     try:
@@ -261,11 +266,20 @@ def _listens(address: str) -> bool | None:
     return True
 
 
-def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> LoadFigures:
+def _make_keys(options: LoadOptions, devices: int) -> None:
+    """Make the keys that are missing, that of a DVA which is started here among them."""
+    if options.keys is not None:
+        shares = _shares(options, devices, "")
+        crew = [(kind, ns) for share in shares for kind, ns in share.numbers().items()]
+        ids = [id_of(kind, n) for kind, ns in crew for n in ns]
+        create_keys(options.keys, ids if options.dva is not None else [DVA, *ids])
+
+
+def _shares(options: LoadOptions, devices: int, address: str) -> list[LoadShare]:
     count = options.processes
     settle = SETTLE + devices / JOINS_PER_S
     parts = [_part(whole, count) for whole in (devices, options.sessions)]
-    shares = [
+    return [
         LoadShare(
             dva=address,
             host=options.host if options.scheduler is None else "",
@@ -279,15 +293,20 @@ def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> L
             duration=options.duration,
             settle=settle,
             seed=options.seed,
+            keys=None if options.keys is None else str(options.keys.absolute()),
         )
         for number, (own, sessions) in enumerate(zip(*parts, strict=True))
     ]
+
+
+def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> LoadFigures:
+    shares = _shares(options, devices, address)
     before = dva.used_s
     if options.scheduler is None:
         every = _made_here(shares)
     else:
         every = _made_on_cluster(options.scheduler, shares)
-    looked = dva.look(before, settle + options.duration)
+    looked = dva.look(before, shares[0].settle + options.duration)
     return figures_of(options, devices, every, looked)
 
 

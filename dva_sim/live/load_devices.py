@@ -22,6 +22,7 @@ from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.open_files import check_room_for
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import address_towards
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
@@ -54,6 +55,7 @@ class LoadShare:
         duration: Time over which it measures [s].
         settle: Time for all to join before that [s].
         seed: Seed of positions and of who vanishes.
+        keys: Folder of their keys; None: not encrypted.
     """
 
     dva: str
@@ -68,6 +70,19 @@ class LoadShare:
     duration: float
     settle: float
     seed: int
+    keys: str | None = None
+
+    def numbers(self) -> dict[str, range]:
+        """Return the numbers of the devices, by kind."""
+        guards = int(GUARDS * (self.devices - 2 * self.sessions - 1))
+        counts = {
+            "detector": 1,
+            "guard": guards,
+            "robot": self.devices - self.sessions - guards - 1,
+            "operator": self.sessions,
+        }
+        first = FIRST + PROCESS_STRIDE * self.number
+        return {kind: range(first, first + count) for kind, count in counts.items()}
 
 
 @dataclass
@@ -117,12 +132,14 @@ class LoadDevices:
         self._vanished: deque[AgentDevice] = deque()
         self.counts = LoadCounts()
         network.introduce(DVA, share.dva)
-        self._detector = self._device("detector", 0)
-        guards = int(GUARDS * (share.devices - 2 * share.sessions - 1))
-        others = share.devices - share.sessions - guards - 1
-        self._guards = [self._device("guard", number) for number in range(guards)]
-        self._robots = [self._device("robot", number) for number in range(others)]
-        self._operators = [self._device("operator", number) for number in range(share.sessions)]
+        everybody = {
+            kind: [self._device(kind, number) for number in numbers]
+            for kind, numbers in share.numbers().items()
+        }
+        (self._detector,) = everybody["detector"]
+        self._guards = everybody["guard"]
+        self._robots = everybody["robot"]
+        self._operators = everybody["operator"]
 
     def begin(self) -> None:
         """Let all join, evenly over the first half of the time to settle, and do their work."""
@@ -147,7 +164,6 @@ class LoadDevices:
         return self.counts
 
     def _device(self, kind: str, number: int) -> AgentDevice:
-        number += FIRST + PROCESS_STRIDE * self._share.number
         id_tag = id_of(kind, number)
         return AgentDevice(
             id_tag=id_tag,
@@ -268,7 +284,7 @@ def make(share: LoadShare, supervised: bool = False) -> dict[str, Any]:
         DvaSimError: there are too few open files, or an address is not free.
     """
     check_room_for(share.devices)
-    network = SocketNetwork(LiveClock())
+    network = SocketNetwork(LiveClock(), KeyRing(share.keys) if share.keys else None)
     try:
         devices = LoadDevices(
             network, replace(share, host=share.host or address_towards(share.dva))

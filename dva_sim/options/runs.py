@@ -351,6 +351,10 @@ class LoadOptions:
         int, OptionForm("Number of processes that make the load.", least=1, most=16)
     ] = 1
     scheduler: Scheduler = None
+    keys: Annotated[
+        Path | None,
+        OptionForm("Folder of keys; turns on CURVE. Those missing are made.", metavar="FOLDER"),
+    ] = None
     out: Annotated[Path | None, out_form("Save the figures: X.csv.", "FILE")] = None
     overwrite: Overwrite = False
     seed: RunSeed = 1

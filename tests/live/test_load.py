@@ -15,6 +15,7 @@ from dva_sim.experiments.execution import dask_cluster
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.load import LoadedDva, figures_of, order_times, said
 from dva_sim.live.load_devices import LoadCounts
+from dva_sim.network.keys import KeyRing
 from dva_sim.options.runs import LoadOptions
 from dva_sim.serving.processes import Child, end_all
 
@@ -94,3 +95,11 @@ def test_workers_of_a_cluster_make_a_load_and_its_figures_but_those_of_two_clock
     assert (figures["joined"], figures["lost"], figures["broke"]) == (20, 0, "")
     assert figures["messages_per_s"] > 40
     assert figures["orders_p50_s"] is None
+
+
+@pytest.mark.system
+def test_an_encrypted_load_makes_the_keys_that_are_missing(tmp_path):
+    words = ["--devices", "6", "--sessions", "1", "--for", "1", "--keys", tmp_path / "keys"]
+    (figures,) = json.loads(call("load", *words, "--json").stdout)
+    assert (figures["joined"], figures["lost"], figures["broke"]) == (6, 0, "")
+    assert len(KeyRing(tmp_path / "keys").devices) == 7
