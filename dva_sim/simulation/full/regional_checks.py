@@ -243,11 +243,17 @@ class RegionalRules:
                 continue
             if self._since[key] < math.inf:
                 self._since[key] = math.inf  # it is judged once
-                events = (*other.events.open.values(), *other.events.closed.values())
-                has = (e for e in events if e.number not in other.copies and e.kind == event.kind)
-                near = (e for e in has if apart(e.position, event.position) < self._near)
+                near = self._near_elsewhere(page, event)
                 if number not in page.copies and all(e.state is State.EXPIRED for e in near):
                     yield "S13", f"has let go of event {number}, which {by} does not have"
+
+    def _near_elsewhere(self, page: Page, event: Event) -> Iterator[Event]:
+        """Yield the same event in books of others: it may go from one to the next."""
+        for other in self._pages.values():
+            events = (*other.events.open.values(), *other.events.closed.values())
+            same = (e for e in events if e.kind == event.kind and e.number not in other.copies)
+            if other is not page and other.dva not in self._died:
+                yield from (e for e in same if apart(e.position, event.position) < self._near)
 
     def _server_of(self, region: str) -> str | None:
         """Return the DVA with the highest epoch of a region, by the statuses of DVAs."""
