@@ -207,6 +207,8 @@ class RegionalRules:
         else:  # with it goes what it has heard and does, until it hears and does it again
             self._epochs = {key: at for key, at in self._epochs.items() if key[0] != page.dva}
             self._promised_help = [p for p in self._promised_help if p[0] != page.dva]
+            for key in [key for key in self._requests if page.dva in key]:
+                del self._requests[key]  # a new life gives the numbers again
             for rule in ("S14", "S15"):
                 list(self._lasting(rule, page.dva, set(), now))
 
