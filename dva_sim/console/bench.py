@@ -1,8 +1,8 @@
-"""Acts that need a bench, beside all that goes by the protocol."""
+"""Acts and views that need a bench, beside all that goes by the protocol."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, Protocol
 
 from dva_sim.agents.device import do_nothing
@@ -10,8 +10,11 @@ from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import PortAsked
-from dva_sim.console.wire.rows import ServerShown
+from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown
+from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ControlRoomRole
+
+Status = m.RobotStatus | m.PersonStatus
 
 
 class Bench(Protocol):
@@ -49,6 +52,33 @@ class Bench(Protocol):
 
     def forget(self, device: str, then: Callable[[], object] = do_nothing) -> None:
         """Have the DVA forget a device at once, and call `then` once it has."""
+
+
+class BenchView:
+    """View of the bodies on a bench: empty, where all is known by messages alone.
+
+    Pages move bodies ten times a second and follow modes at once, while a status is published once
+    a second. All else that is seen is in no message.
+    """
+
+    def team(self) -> Iterable[tuple[m.Device, str]]:
+        """Return the devices that are there from the start, each with the id of its DVA."""
+        return ()
+
+    def status(self, _: str) -> Status | None:
+        """Return the status of a device of now, by its id; None if it cannot be seen."""
+        return None
+
+    def places(self) -> list[list[int]]:
+        """Return the positions of people on foot: no message tells where one looks."""
+        return []
+
+    def people(self) -> list[DoingShown]:
+        """Return the activities of people on foot, who need not be devices."""
+        return []
+
+    def complete(self, robot: str, row: RobotRow) -> None:
+        """Add to the row of a robot what no message tells."""
 
 
 UNATTENDED: Final = ControlRoomRole.DRIVE  # of a control room at which nobody decides

@@ -28,7 +28,7 @@ from dva_sim.console.system.sensing import WatchedSensors
 from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
-from dva_sim.console.views.published_rows import positions, robot_row
+from dva_sim.console.views.published_rows import emergency_of, mode_of, positions, robot_row
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import RoomEntry, SiteEventShown
 from dva_sim.console.wire.lines import Tell
@@ -36,7 +36,6 @@ from dva_sim.console.wire.rows import DeviceRow, DoingShown, Hearing, RobotRow, 
 from dva_sim.console.wire.scenes import LinkShown, SceneLine
 from dva_sim.kernel.recorder import Breach
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import ROBOT
 from dva_sim.simulation.scenario import Scenario
 
 # From one line to the next, real time [s].
@@ -230,9 +229,12 @@ class ConsolePages:
             self._news.tell({"k": "pos", "t": self.system.now_ms, "p": self.positions()})
 
     def positions(self) -> list[list[int]]:
-        """Return the positions of all devices that have reported one."""
+        """Return the positions of all who can be seen, or have reported one."""
         system = self.system
-        return positions(system.state.devices, system.numbers, system.frame)
+        seen = system.view.places()
+        there = {row[0] for row in seen}
+        reported = positions(system.state.devices, system.numbers, system.frame)
+        return [*seen, *(row for row in reported if row[0] not in there)]
 
     def tell_rows(self) -> None:
         """Tell the state of the clock, the link, the server, and of everybody."""
@@ -254,34 +256,32 @@ class ConsolePages:
         self._tell_alarms(robots)
 
     def robots(self) -> list[RobotRow]:
-        """Return a row for each robot from outside, as it says itself."""
-        system = self.system
-        rows = []
-        for id_tag in system.robots():
-            if id_tag in system.numbers:
-                entry = system.state.devices[id_tag]
-                row = robot_row(
-                    entry, system.numbers[id_tag], self.clock.now, self._stopper_named(id_tag)
-                )
-                row["pattern"] = self.driven.pattern_of(id_tag)
-                row["silent"] = system.is_lost(id_tag)
-                rows.append(row)
-        return rows
+        """Return a row for each robot."""
+        robots = self.system.robots()
+        return [self.robot(id_tag) for id_tag in robots if id_tag in self.system.numbers]
 
-    def _stopper_named(self, robot: str) -> Mapping[str, str]:
-        """Return labels in which a device that stopped a robot from a page is its person."""
-        labels = self.system.labels
-        stopper = self.driven.stoppers.get(robot)
-        return labels if stopper is None else {**labels, stopper[0]: stopper[1]}
+    def robot(self, id_tag: str) -> RobotRow:
+        """Return the row of a robot, as it says itself, with what is seen of it besides."""
+        system = self.system
+        entry = system.state.devices[id_tag]
+        number = system.numbers[id_tag]
+        stopper = self.driven.stoppers.get(id_tag)
+        row = robot_row(entry, number, self.clock.now, system.labels, stopper)
+        row["pattern"] = self.driven.pattern_of(id_tag)
+        row["silent"] = system.is_lost(id_tag)
+        system.view.complete(id_tag, row)
+        return row
 
     def people(self) -> list[DoingShown]:
-        """Return the activities of people from outside, as they say themselves."""
+        """Return the activities of all who can be seen, or as they say themselves."""
         numbers = self.system.numbers
-        return [
-            {"i": numbers[id_tag], "doing": entry.status.activity}
+        reported: dict[int, DoingShown] = {
+            numbers[id_tag]: {"i": numbers[id_tag], "doing": entry.status.activity}
             for id_tag, entry in self.system.state.devices.items()
             if isinstance(entry.status, m.PersonStatus) and id_tag in numbers
-        ]
+        }
+        seen = {row["i"]: row for row in self.system.view.people()}
+        return [*(reported | seen).values()]
 
     def _tell_alarms(self, robots: list[RobotRow]) -> None:
         """Tell alarms; while the state of events is unknown, alarms stay as they are."""
@@ -324,10 +324,14 @@ class ConsolePages:
         self._tell_audit()
 
     def modes(self) -> list[object]:
-        """Return the modes and holders of robots, on a change of which rows are sent at once."""
+        """Return what rows tell of robots at once when it changes: mode, holder, emergency."""
+        now = self.clock.now
         devices = self.system.state.devices
-        robots = [entry for entry in devices.values() if entry.device.device_type == ROBOT]
-        return [(one.holder and one.holder[0].holder, _mode_of(one.status)) for one in robots]
+        robots = [devices[id_tag] for id_tag in self.system.robots()]
+        return [
+            (one.holder and one.holder[0].holder, mode_of(one), emergency_of(one, now, {}) is None)
+            for one in robots
+        ]
 
     def _tell_hearing(self) -> None:
         hearing = self.system.hearing
@@ -384,7 +388,3 @@ class ConsolePages:
             )
             for id_tag, entry in system.state.devices.items()
         ]
-
-
-def _mode_of(status: object) -> str:
-    return status.mode if isinstance(status, m.RobotStatus) else ""

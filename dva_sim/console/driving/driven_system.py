@@ -13,7 +13,7 @@ from dva_sim.console.driving.seating import Seating
 from dva_sim.console.events.decisions import UNKNOWN_ROOM
 from dva_sim.console.system.known_system import KnownSystem
 from dva_sim.console.system.things import UNKNOWN_ROBOT
-from dva_sim.console.views.published_rows import emergency_of
+from dva_sim.console.views.published_rows import emergency_of, mode_of
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.geo import GeoFrame
@@ -99,8 +99,7 @@ class DrivenSystem:
     def mode_of(self, robot: str) -> str:
         """Return the mode of a robot; empty if it is unknown."""
         entry = self.system.state.devices.get(robot)
-        status = None if entry is None else entry.status
-        return status.mode if isinstance(status, m.RobotStatus) else ""
+        return "" if entry is None else mode_of(entry)
 
     def pattern_of(self, robot: str) -> str:
         """Return the name of the pattern by which a robot is driven next, or now."""
@@ -147,7 +146,7 @@ class DrivenSystem:
         """Let a device know where robots from outside are found."""
         for robot in robots:
             entry = self.system.state.devices.get(robot)
-            if entry is not None and not entry.is_own:
+            if entry is not None and not self.system.state.is_own(robot):
                 device.introduce(robot, entry.device.address)
 
     def why_not(self) -> str:

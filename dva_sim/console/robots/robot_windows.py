@@ -17,8 +17,7 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.latencies import Latencies
-from dva_sim.console.robots.shown_mode import shown_mode
-from dva_sim.console.wire.rows import RobotWindowLine, SensorShown, StationShown
+from dva_sim.console.wire.rows import RobotRow, RobotWindowLine, SensorShown, StationShown
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.tap import Exchange
@@ -103,8 +102,6 @@ class RobotWindows:
     Args:
         recorder: Recorder of the run.
         robots: By id.
-        numbers: Numbers of all agents, by id.
-        labels: Labels of all devices, by id.
         sent_at: Send time of a message, by its bytes [s]; None: not sent by this process.
         lost: Callback for each dropped reply.
     """
@@ -113,14 +110,10 @@ class RobotWindows:
         self,
         recorder: Recorder,
         robots: Mapping[str, RobotAgent],
-        numbers: Mapping[str, int],
-        labels: Mapping[str, str],
         sent_at: Callable[[bytes], float | None],
         lost: Callable[[str, bytes], object],
     ) -> None:
         self._recorder = recorder
-        self._numbers = numbers
-        self._labels = labels
         self._sent_at = sent_at
         self.by_id = {
             id_tag: RobotWindow(
@@ -181,20 +174,18 @@ class RobotWindows:
                 window.robot.device.tell(window.notice, "mode")
 
     def lines(
-        self, watched: Iterable[str], reason_of: Callable[[RobotAgent], str]
+        self, watched: Iterable[str], row_of: Callable[[str], RobotRow]
     ) -> Iterator[RobotWindowLine]:
         """Yield a line for each robot that somebody looks at.
 
         Args:
             watched: Those, by id.
-            reason_of: Reason why a robot stands, in words.
+            row_of: Function that returns the row of a robot.
         """
         for id_tag in watched:
-            yield self._line(id_tag, self.by_id[id_tag], reason_of)
+            yield self._line(self.by_id[id_tag], row_of(id_tag))
 
-    def _line(
-        self, id_tag: str, window: RobotWindow, reason_of: Callable[[RobotAgent], str]
-    ) -> RobotWindowLine:
+    def _line(self, window: RobotWindow, row: RobotRow) -> RobotWindowLine:
         robot = window.robot
         now = window.robot.device.clock.now
         point = robot.set_point
@@ -206,12 +197,12 @@ class RobotWindows:
         return {
             "k": "robot",
             "t": round(1000 * now),
-            "i": self._numbers[id_tag],
+            "i": row["i"],
             "station": window.station.line(),
-            "mode": shown_mode(robot.controller),
+            "mode": row["mode"],
             "hand": window.number,
-            "holder": self._labels.get(robot.holder[0] or "", robot.holder[0]),
-            "stop_reason": reason_of(robot),
+            "holder": row["holder_label"],
+            "stop_reason": row["stop_reason"],
             "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
             "notice": window.notice,
             "speed_mps": round(speed, 3),

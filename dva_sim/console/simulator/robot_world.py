@@ -12,29 +12,31 @@ from functools import partial
 from typing import Final
 
 from dva_sim.agents.observation import Cameras
-from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.lines import Show, scene_line
 from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.robots.robot_station import LISTENING, OwnStation
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
-from dva_sim.console.views.feed import Feed
+from dva_sim.console.system.system_state import DeviceState
+from dva_sim.console.views.feed import Feed, device_of
 from dva_sim.console.views.logs import Logs
 from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.views.published_rows import positions, robot_row
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.rows import RobotRow
 from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import PacedClock
+from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import motion_of, terms_of
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import WATCH_PERIOD
@@ -99,7 +101,6 @@ class RobotWorld:
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
-        self.lag = LagRule()
         self._news = News(lambda: self.tell)
         self.hold: Callable[[str], object] = lambda _: None
         self.clock.on_late = self._late
@@ -140,7 +141,8 @@ class RobotWorld:
         """Feed, windows, log, camera and audit look at the robot from now on."""
         robot = self.robot
         id_tag = self.robot.device.id_tag
-        self.feed = Feed(self)
+        self.lag = LagRule()
+        self.feed = Feed(self, self.lag)
         self.recorder.robots = {id_tag}
         self.audit = SafetyAudit(
             self.recorder,
@@ -151,9 +153,8 @@ class RobotWorld:
         self.recorder.on_accepted = self.audit.accepted
         self.recorder.on_hand = self.audit.by_hand
         self.sockets.watch(self.audit)
-        about = self.feed.numbers, self.stage.labels
         self.windows = RobotWindows(
-            self.recorder, self.field.robots, *about, self.recorder.sent_at, self._lost
+            self.recorder, self.field.robots, self.recorder.sent_at, self._lost
         )
         self.windows.by_id[id_tag].station = self.station
         self.feed.things.learn(id_tag, self.windows.about(id_tag))
@@ -236,22 +237,42 @@ class RobotWorld:
                 "clock": clock_shown(self.clock, self.lag),
                 "link": LINK,
                 "dropped": self.dropped(),
-                "robots": self.feed.robots(self.lag.held),
+                "robots": [self._row(self.robot.device.id_tag)],
                 "people": [],
                 "order": None,
             }
         )
 
+    def _row(self, robot: str) -> RobotRow:
+        """Return the row of the robot, by what it would report now: nobody else is here."""
+        row = robot_row(self._state(), self.feed.numbers[robot], self.clock.now, self.stage.labels)
+        row["pattern"] = self.feed.pattern_of(robot)
+        self.feed.complete(robot, row)
+        if self.station.state != LISTENING:
+            row["stop_reason"] = f"it is {self.station.state}"
+        return row
+
+    def _state(self) -> DeviceState:
+        now = self.clock.now
+        robot = self.robot
+        latch = robot.controller.latch
+        holder, held_for = robot.holder
+        return DeviceState(
+            device_of(robot.device),
+            listed=now,
+            dva=robot.device.dva,
+            published=self.feed.status(robot.device.id_tag),
+            holder=(m.RobotHolder(holder, None, held_for), now),
+            emergency=(latch.message(now), now) if latch.holds else None,
+        )
+
     def _tell_positions(self) -> None:
-        self._news.tell({"k": "pos", "t": self.feed.now_ms, "p": self.feed.positions()})
+        id_tag = self.robot.device.id_tag
+        places = positions({id_tag: self._state()}, self.feed.numbers, self.stage.site.frame)
+        self._news.tell({"k": "pos", "t": self.feed.now_ms, "p": places})
 
     def _tell_windows(self) -> None:
-        def reason_of(robot: RobotAgent) -> str:
-            if self.station.state != LISTENING:
-                return f"it is {self.station.state}"
-            return stop_reason(robot, self.clock.now, self.lag.held)
-
-        for line in self.windows.lines(self.screens.watched, reason_of):
+        for line in self.windows.lines(self.screens.watched, self._row):
             self._news.tell(line)
 
     def _tell_news(self) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import PEER_STATUS, RENEW_PERIOD, do_nothing
-from dva_sim.console.bench import Bench
+from dva_sim.console.bench import Bench, BenchView
 from dva_sim.console.system.served_regions import ALARM_AFTER, ServedRegions
 from dva_sim.console.system.site_control_room import SiteControlRoom
 from dva_sim.console.system.system_state import SystemState
@@ -53,6 +53,7 @@ class KnownSystem:
         regions: Regions of the site, of which its DVAs tell.
         site: Site, if one is known.
         bench: Bench on which the DVA runs; None: it runs elsewhere.
+        view: View of the devices on the bench.
         things: Robots and people that are known already, with their numbers.
         own: Function that returns the ids of the devices of the console's own run.
 
@@ -76,6 +77,7 @@ class KnownSystem:
         regions: ServedRegions,
         site: Site | None,
         bench: Bench | None,
+        view: BenchView | None = None,
         things: Things | None = None,
         own: Callable[[], Container[str]] = tuple,
     ) -> None:
@@ -92,7 +94,8 @@ class KnownSystem:
         self.things = things or Things()
         self.numbers = self.things.numbers
         self.on_devices: Callable[[], object] = do_nothing
-        self.state = SystemState(self.device, labels, own, self._number_all)
+        self.view = view or BenchView()
+        self.state = SystemState(self.device, labels, own, self.view, self._number_all)
         self.has_all_events = False
         self.switched = 0.0
         self._started = 0.0
@@ -113,6 +116,8 @@ class KnownSystem:
         for room in self.agent.rooms:
             room.on_forgotten = self._ask_again
         self.agent.start()
+        for device, dva in self.view.team():
+            self.state.meet(device, dva, math.inf)  # as if on the newest list until it is on one
         for dva in self.regions.own.values():
             own = self.device.id_tag
             self.device.network.subscribe(own, dva, PEER_STATUS, partial(self._hear_dva, dva))
@@ -228,7 +233,7 @@ class KnownSystem:
             if isinstance(reply.content, m.SensorList):
                 self.state.sensors(reply.content)
 
-        if not all(entry.is_own for entry in self.state.devices.values()):
+        if not all(map(self.state.is_own, self.state.devices)):
             for room in self.agent.rooms:
                 room.ask(m.GetSensorInfo(), answered)
 
@@ -244,7 +249,7 @@ class KnownSystem:
             label = entry.device.label
             if id_tag in self._foreign:
                 self.things.rename(id_tag, label)
-            elif kind and room > 0 and not entry.is_own and id_tag not in self.numbers:
+            elif kind and room > 0 and id_tag not in self.numbers:
                 self.things.add_foreign(id_tag, label, kind, body)
                 self._foreign.add(id_tag)
                 room -= 1
@@ -259,9 +264,8 @@ class KnownSystem:
         return [thing for thing in self.things.all if thing["id"] not in gone]
 
     def robots(self) -> list[str]:
-        """Return ids of the robots that the DVA lists, but for those of the console's own run."""
-        devices = self.state.devices.items()
-        return [i for i, one in devices if one.device.device_type == ROBOT and not one.is_own]
+        """Return ids of the robots that a DVA lists, and of those that can be seen."""
+        return [i for i, one in self.state.devices.items() if one.device.device_type == ROBOT]
 
     def is_lost(self, id_tag: str) -> bool:
         """Return True if the DVA had listed a device, and no longer does: it has fallen silent.
@@ -271,7 +275,9 @@ class KnownSystem:
         if self.clock.now - self._forgotten < RENEW_PERIOD + POLL:
             return False
         entry = self.state.devices.get(id_tag)
-        return id_tag in self._met if entry is None else entry.listed < self._listed[entry.dva]
+        if entry is None:
+            return id_tag in self._met
+        return entry.listed < self._listed.get(entry.dva, -math.inf)
 
     def dva_of(self, id_tag: str) -> str | None:
         """Return the id of the DVA that lists a device; None if none does."""

@@ -153,7 +153,7 @@ class WatchedSensors:
         """Begin where it has become known by now which sensors a robot has; end what is over."""
         devices = self._state.devices
         looked = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in devices]
-        id_tags = [id_tag for id_tag in looked if id_tag and not devices[id_tag].is_own]
+        id_tags = [id_tag for id_tag in looked if id_tag and not self._state.is_own(id_tag)]
         for id_tag in [one for one in self._watches if one not in id_tags]:
             self._watches.pop(id_tag).end()
             if id_tag in devices:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 from dva_sim.agents.device import EMERGENCY, HEARTBEAT, HOLDER, STATUS, AgentDevice
+from dva_sim.console.bench import BenchView, Status
 from dva_sim.kernel.labels import distinct
 from dva_sim.kernel.rates import Rate
 from dva_sim.network.messaging import Subscription
@@ -24,9 +26,9 @@ class DeviceState:
         device: Device as in the list.
         listed: Time of the latest list that contains it [s].
         dva: Id of the DVA whose list that is.
-        is_own: True if it belongs to the console's own run, so that nobody need listen to it.
         heard: Time of its latest publication; None: never [s].
-        status: Latest status that it published.
+        published: Latest status that it published.
+        look: Function that returns its status of now if the device can be seen; see `BenchView`.
         holder: Holder that it reported, and time of the report [s].
         emergency: Emergency that it reported, and time of the report [s].
         beats: Heartbeats heard.
@@ -38,9 +40,9 @@ class DeviceState:
     device: m.Device
     listed: float
     dva: str
-    is_own: bool = False
     heard: float | None = None
-    status: m.RobotStatus | m.PersonStatus | None = None
+    published: Status | None = None
+    look: Callable[[], Status | None] = lambda: None
     holder: tuple[m.RobotHolder, float] | None = None
     emergency: tuple[m.RobotEmergency, float] | None = None
     beats: int = 0
@@ -50,6 +52,11 @@ class DeviceState:
     rate: Rate = field(default_factory=Rate)
     subscriptions: list[Subscription] = field(default_factory=list)
 
+    @property
+    def status(self) -> Status | None:
+        """Newest status."""
+        return self.look() or self.published
+
 
 class SystemState:
     """All devices that the DVA lists, and what they publish.
@@ -58,6 +65,7 @@ class SystemState:
         device: Device that subscribes.
         labels: Labels of devices by id, which it keeps up to date.
         own: Function that returns the ids of the devices of the console's own run.
+        view: View of the devices on the bench.
         on_news: Callback when a device appears or disappears.
 
     Attributes:
@@ -69,11 +77,13 @@ class SystemState:
         device: AgentDevice,
         labels: dict[str, str],
         own: Callable[[], Container[str]],
+        view: BenchView,
         on_news: Callable[[], object],
     ) -> None:
         self._device = device
         self._labels = labels
         self._own = own
+        self._look = view.status
         self._on_news = on_news
         self.devices: dict[str, DeviceState] = {}
 
@@ -86,27 +96,29 @@ class SystemState:
         before = {(i, entry.device) for i, entry in self.devices.items()}
         own = self._own()
         for device in devices:
+            others = [label for id_tag, label in self._labels.items() if id_tag != device.id_tag]
+            label = distinct(device.label, device.id_tag, others)
             if device.id_tag in own:
-                label = self._labels[device.id_tag]
-                entry = DeviceState(replace(device, label=label), self._now, dva, is_own=True)
-                self.devices[device.id_tag] = entry
-            else:
-                named = self._labels.items()
-                others = [label for id_tag, label in named if id_tag != device.id_tag]
-                label = distinct(device.label, device.id_tag, others)
-                self._meet(replace(device, label=label), dva)
+                label = self._labels[device.id_tag]  # its person may have given it another one
+            self.meet(replace(device, label=label), dva, self._now)
         late = [i for i, entry in self.devices.items() if self._now - entry.listed > FORGET_AFTER]
         for id_tag in late:
-            self.forget(id_tag)
+            if self._look(id_tag) is None:
+                self.forget(id_tag)
         if {(i, entry.device) for i, entry in self.devices.items()} != before:
             self._on_news()
 
     def forget(self, id_tag: str) -> None:
         """Listen to a device no longer, and know nothing of it."""
         state = self.devices.pop(id_tag, None)
-        if state is not None and not state.is_own:
+        if state is not None:
             self._leave(state)
-            self._device.forget(id_tag)
+            if not self.is_own(id_tag):
+                self._device.forget(id_tag)
+
+    def is_own(self, id_tag: str) -> bool:
+        """Return True for a device of the console's own run."""
+        return id_tag in self._own()
 
     def sensors(self, sensor_list: m.SensorList) -> None:
         """Take the DVA's list of what the devices can show."""
@@ -115,25 +127,28 @@ class SystemState:
                 state.camera = one.camera_url
                 state.sensors = one.sensors
 
-    def _meet(self, device: m.Device, dva: str) -> None:
-        """Subscribe to a device, again if its address has changed."""
+    def meet(self, device: m.Device, dva: str, listed: float) -> None:
+        """Subscribe to a device that a DVA lists, again if its address has changed."""
         self._labels[device.id_tag] = device.label
         entry = self.devices.get(device.id_tag)
         if entry is not None and entry.device.address == device.address:
             entry.device = device
-            entry.listed = self._now
+            entry.listed = listed
             entry.dva = dva
             return
         if entry is not None:
             self._leave(entry)
-        state = self.devices[device.id_tag] = entry or DeviceState(device, self._now, dva)
+        look = partial(self._look, device.id_tag)
+        state = entry or DeviceState(device, listed, dva, look=look)
+        self.devices[device.id_tag] = state
         state.device = device
-        state.listed = self._now
+        state.listed = listed
         state.dva = dva
         network = self._device.network
         me = self._device.id_tag
         node = device.id_tag
-        network.introduce(node, device.address)
+        if not self.is_own(node):
+            network.introduce(node, device.address)
         for topic in TOPICS.get(device.device_type, (HEARTBEAT,)):
             heard = self._hearing(state)
             state.subscriptions.append(network.subscribe(me, node, topic, heard))
@@ -146,7 +161,7 @@ class SystemState:
             device_state.heard = self._now
             body = message.body
             if isinstance(body, m.RobotStatus | m.PersonStatus):
-                device_state.status = body
+                device_state.published = body
             elif isinstance(body, m.RobotHolder):
                 device_state.holder = body, self._now
             elif isinstance(body, m.RobotEmergency):

@@ -26,15 +26,32 @@ def positions(
         status = entry.status
         if status is None:
             continue
-        x, y = frame.to_xy(status.position.latitude, status.position.longitude)
-        heading = 0.0
-        speed = 0.0
+        place = frame.to_xy(status.position.latitude, status.position.longitude)
+        motion = 0.0, 0.0
         if isinstance(status, m.RobotStatus):
-            heading = math.remainder(status.heading, 2.0 * math.pi)
-            speed = status.speed
-        whole = round(100 * x), round(100 * y), round(1000 * heading), round(1000 * speed)
-        rows.append([numbers[id_tag], *whole])
+            motion = status.heading, status.speed
+        rows.append(place_shown(numbers[id_tag], place, *motion))
     return rows
+
+
+def place_shown(number: int, place: tuple[float, float], heading: float, speed: float) -> list[int]:
+    """Return the position of somebody; see `PlacesLine`.
+
+    Args:
+        number: Number by which pages know them.
+        place: Position on the map [m].
+        heading: [rad]
+        speed: [m/s]
+    """
+    turn = math.remainder(heading, 2.0 * math.pi)
+    x, y = place
+    return [number, round(100 * x), round(100 * y), round(1000 * turn), round(1000 * speed)]
+
+
+def mode_of(device_state: DeviceState) -> str:
+    """Return the mode of a robot; empty if it is unknown."""
+    status = device_state.status
+    return status.mode if isinstance(status, m.RobotStatus) else ""
 
 
 def emergency_of(
@@ -49,22 +66,30 @@ def emergency_of(
 
 
 def robot_row(
-    device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
+    device_state: DeviceState,
+    number: int,
+    now: float,
+    labels: Mapping[str, str],
+    stopper: tuple[str, str] | None = None,
 ) -> RobotRow:
-    """Return a robot, as it says itself."""
-    status = device_state.status
+    """Return a robot, as it says itself.
+
+    Args:
+        device_state: Its state.
+        number: Number by which pages know it.
+        now: [s]
+        labels: Labels of devices, by id.
+        stopper: Device and name of the person who last stopped it from a page.
+    """
+    stoppers = {**labels, stopper[0]: stopper[1]} if stopper is not None else labels
+    mode = mode_of(device_state)
     holder = device_state.holder
-    robot_status = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
-    is_driven = robot_status is not None and robot_status.mode == Mode.TELEOPERATION.value
+    is_driven = mode == Mode.TELEOPERATION.value
     is_unheard = device_state.heard is not None and now - device_state.heard > SILENT_AFTER
     return {
-        **_unknown_robot(
-            number,
-            robot_status.mode if robot_status is not None else "unknown",
-            emergency_of(device_state, now, labels),
-        ),
+        **_unknown_robot(number, mode or "unknown", emergency_of(device_state, now, stoppers)),
         "stop_reason": UNHEARD if is_driven and is_unheard else "",
         "holder": holding.holder if holding is not None else None,
         "holder_label": holder_named(holding, labels),

@@ -1,4 +1,4 @@
-"""The robots of a console's own run, beside those that have joined it from outside."""
+"""The robots of a console's own run, as people in seats drive them from pages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PEOPLE: Final = 1  # operators of the scenario whose places people take
 
 
 class DrivenRun(DrivenSystem):
-    """Robots of a run: more is known of them than they publish, and more can be done to them.
+    """Robots of a run, which can be prepared for a pattern, and held while the run lags.
 
     Args:
         run: The run.
@@ -84,15 +84,6 @@ class DrivenRun(DrivenSystem):
         return self.seating.person(0).device
 
     @override
-    def robots(self) -> list[str]:
-        return [*self._run.field.robots, *self.system.robots()]
-
-    @override
-    def mode_of(self, robot: str) -> str:
-        agent = self._run.field.robots.get(robot)
-        return super().mode_of(robot) if agent is None else agent.controller.mode.value
-
-    @override
     def pattern_of(self, robot: str) -> str:
         return self._run.stage.pattern_name(robot)
 
@@ -104,12 +95,6 @@ class DrivenRun(DrivenSystem):
     @override
     def reach(self, robot: str) -> Reach:
         return self._run.stage.reach(robot)
-
-    @override
-    def stopped(self) -> list[str]:
-        here = self._run.field.robots.items()
-        latched = (robot for robot, agent in here if agent.controller.latch.holds)
-        return [*latched, *super().stopped()]
 
     @override
     def why_not(self) -> str:

@@ -13,19 +13,16 @@ from typing import Any, Final
 from typing_extensions import override
 
 from dva_sim.agents.observation import Cameras
-from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.lines import FrameLine, contained_line, scene_line
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.desk.console_pages import ConsolePages
-from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.dva.run_fakes import fakes_of
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import MakeSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
@@ -38,7 +35,7 @@ from dva_sim.console.views.logs import Logs
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.limits import LOG_PERIOD
-from dva_sim.console.wire.rows import DeviceRow, DoingShown, RobotRow, ServerShown
+from dva_sim.console.wire.rows import DeviceRow, ServerShown
 from dva_sim.console.wire.scenes import LinkShown, SceneLine
 from dva_sim.console.world.driven_run import PEOPLE, DrivenRun
 from dva_sim.kernel.errors import DvaSimError
@@ -114,7 +111,8 @@ class ConsoleWorld(ConsolePages):
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed = Feed(self.run)
+        self.lag = LagRule()
+        self.feed = Feed(self.run, self.lag)
         self.windows = self._windows()
         emulated = self.sockets is not None and self.sockets.crossing is not None
         self.sliders = LinkSliders(self.run, self.windows.set_usual, emulated)
@@ -126,11 +124,11 @@ class ConsoleWorld(ConsolePages):
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.bench = RunBench(self.run, self.phones.address, self.sockets, self._dva_moved)
-        self._device_rows = DeviceRows(self.run, self.bench)
+        self.bench = RunBench(
+            self.run, self.feed, self.phones.address, self.sockets, self._dva_moved
+        )
         rooms = ConsoleRooms(self.run, self.bench.appoint)
         system = self._system(rooms)
-        self.lag = LagRule()
         super().__init__(
             system,
             rooms=rooms,
@@ -145,7 +143,6 @@ class ConsoleWorld(ConsolePages):
             phones=self.phones.by_client,
             breaches=self.recorder.broken.values,
         )
-        self.feed.stoppers = self.driven.stoppers
         for id_tag, label in dvas_of(scenario).items():
             self.feed.things.add(id_tag, label, "dva")
         self.guards = PlayedGuards(self.run, self.feed)
@@ -173,6 +170,7 @@ class ConsoleWorld(ConsolePages):
             regions=regions_of(self.scenario),
             site=stage.site,
             bench=self.bench,
+            view=self.feed,
             things=self.feed.things,
             own=self._own_devices,
         )
@@ -195,8 +193,7 @@ class ConsoleWorld(ConsolePages):
             if recorder.kept is not None:
                 recorder.kept.message(robot, reply, sent=True)
 
-        about = self.feed.numbers, run.stage.labels
-        windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
+        windows = RobotWindows(recorder, run.field.robots, recorder.sent_at, lost)
         for id_tag in run.field.robots:
             self.feed.things.learn(id_tag, windows.about(id_tag))
         return windows
@@ -320,40 +317,18 @@ class ConsoleWorld(ConsolePages):
         return server
 
     @override
-    def positions(self) -> list[list[int]]:
-        return self.feed.positions() + super().positions()
-
-    @override
     def tell_rows(self) -> None:
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         super().tell_rows()
 
     @override
-    def robots(self) -> list[RobotRow]:
-        rows = self.feed.robots(self.lag.held)
-        for id_tag, row in zip(self.run.field.robots, rows, strict=True):
-            row["silent"] = self.system.is_lost(id_tag)
-        return rows + super().robots()
-
-    @override
-    def people(self) -> list[DoingShown]:
-        return self.feed.people() + super().people()
-
-    @override
-    def modes(self) -> list[object]:
-        robots = self.run.field.robots.values()
-        own = [(robot.controller.mode, robot.holder[0]) for robot in robots]
-        return [*own, *super().modes()]
-
-    @override
     def devices(self) -> list[DeviceRow]:
-        return self._device_rows.rows(self.fakes.devices)
+        rows = super().devices()
+        self.bench.complete(rows, self.system.dva_of)
+        return rows
 
     def _tell_windows(self) -> None:
-        def reason_of(robot: RobotAgent) -> str:
-            return stop_reason(robot, self.clock.now, self.lag.held)
-
-        for line in self.windows.lines(self.screens.watched, reason_of):
+        for line in self.windows.lines(self.screens.watched, self.robot):
             self._news.tell(line, line["i"])
 
     def _tell_logs(self) -> None:

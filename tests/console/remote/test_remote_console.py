@@ -56,7 +56,7 @@ def test_a_robot_is_shown_as_it_says_itself():
     latitude, longitude = HERE.to_latlon(3.0, -4.0)
     status = m.RobotStatus("Teleoperation", m.Position(latitude, longitude), 1.0, 0.25, 0.0, 7)
     holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
-    robot = device_state(status=status, holder=holder, heard=4.0)
+    robot = device_state(published=status, holder=holder, heard=4.0)
     row = robot_row(robot, 3, 5.0, {})
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)

@@ -139,7 +139,7 @@ def test_an_emergency_waits_for_no_connection_whatever_the_delay(monkeypatch):
     page.actions.take({"id": "now", "client": "another", "do": "emergency", "robots": "all"})
     page.let(0.51)
     assert page.robot().controller.mode is Mode.IDLE
-    page.let(0.1)
+    page.let(0.6)  # its word of that takes as long as the order did
     assert page.lines_of("rows")[-1]["robots"][0]["mode"] == "Emergency"
 
 

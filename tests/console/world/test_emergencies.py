@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from helpers.console.simulated_console import Page
 
-from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.simulation.full.stage import id_of
 
 pytestmark = pytest.mark.invariant("S3")
@@ -31,7 +30,7 @@ def stopped(page):
 def test_everybody_sees_who_stopped_which_robots(page):
     assert page.do("emergency", robots="all")[0]
     assert stopped(page) == {"robot-1": "page c1", "robot-2": "page c1"}
-    rows = DeviceRows(page.world.run, page.world.bench).rows(())
+    rows = page.world.devices()
     assert [row["doing"] for row in rows if row["type"] == "Robot"] == ["Emergency"] * 2
 
 
