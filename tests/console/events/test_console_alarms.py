@@ -147,20 +147,6 @@ def test_a_fleet_that_stands_is_one_alarm(alarms):
     assert text == "Emergency stop: 2 of 3 robots stopped until released"
 
 
-def test_a_robot_that_falls_silent_is_lost_to_the_pages_when_it_is_to_the_dva(page):
-    entry = page.world.run.dva.core.registry.entries
-    agent = page.robot()
-    page.until(lambda: agent.device.id_tag in entry)
-    page.let(3.0)
-    agent.device.leave()
-    page.until(lambda: entry[agent.device.id_tag].silent)
-    page.let(2.5)  # the list is asked for every 2 s
-    (row,) = [row for row in page.lines_of("rows")[-1]["robots"] if row["silent"]]
-    assert row["i"] == page.world.feed.numbers[agent.device.id_tag]
-    shown = {alarm["text"] for alarm in page.lines_of("alarms")[-1]["alarms"]}
-    assert f"{agent.device.label} is lost: the DVA hears nothing of it" in shown
-
-
 def test_a_dva_that_says_nothing_is_an_alarm_until_it_speaks_again(page):
     page.let(3.0)
     assert page.do("server_stop")[0]
