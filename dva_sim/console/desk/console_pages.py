@@ -231,10 +231,9 @@ class ConsolePages:
     def positions(self) -> list[list[int]]:
         """Return the positions of all who can be seen, or have reported one."""
         system = self.system
-        seen = system.view.places()
-        there = {row[0] for row in seen}
         reported = positions(system.state.devices, system.numbers, system.frame)
-        return [*seen, *(row for row in reported if row[0] not in there)]
+        rows = {row[0]: row for row in (*reported, *system.view.places())}
+        return [*rows.values()]
 
     def tell_rows(self) -> None:
         """Tell the state of the clock, the link, the server, and of everybody."""

@@ -26,18 +26,21 @@ class RecordedTracks:
 
     def places(self, now: float) -> Iterator[tuple[str, TrackPoint, float]]:
         """Yield everybody who is on the site: label, place, and speed [m/s]."""
-        for label, track in self._tracks.items():
-            index = bisect_right(self._times[label], now)
-            if index == 0:
-                continue
-            before = track[index - 1]
-            after = track[min(index, len(track) - 1)]
-            if after is before:
-                left = now - before.time > GONE and before.time < self._duration - GONE
-                if not left:
-                    yield label, before, 0.0
-                continue
-            yield label, *_between(before, after, now)
+        for label in self._tracks:
+            if (place := self.place(label, now)) is not None:
+                yield label, *place
+
+    def place(self, label: str, now: float) -> tuple[TrackPoint, float] | None:
+        """Return the place and speed [m/s] of somebody; None if they are not on the site."""
+        track = self._tracks.get(label, ())
+        index = bisect_right(self._times.get(label, ()), now)
+        if index == 0:
+            return None
+        before, after = track[index - 1], track[min(index, len(track) - 1)]
+        if after is before:
+            has_left = now - before.time > GONE and before.time < self._duration - GONE
+            return None if has_left else (before, 0.0)
+        return _between(before, after, now)
 
 
 def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:

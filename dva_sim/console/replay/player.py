@@ -251,6 +251,7 @@ class Player:
             "robots": run.robots(now),
             "people": run.people(now),
             "order": None,
+            "regions": run.system.regions(now),
         }
         self.tell(rows)
         self.tell(run.events(now))

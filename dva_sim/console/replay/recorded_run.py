@@ -7,29 +7,30 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from dva_sim.agents.control_room.history import EventHistory
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
-from dva_sim.console.dva.device_rows import device_row
+from dva_sim.console.bench import Status
+from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.replay.moments import (
     RecordedTracks,
     captured_at,
     commands_hz,
     set_point,
 )
-from dva_sim.console.replay.robot_lines import RobotLines, about
-from dva_sim.console.robots.shown_mode import EMERGENCY
+from dva_sim.console.replay.recorded_system import RecordedSystem
+from dva_sim.console.replay.robot_lines import about, robot_window
 from dva_sim.console.system.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.published_rows import robot_row
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.events import EventsLine, HazardsLine, StorySoFarLine
 from dva_sim.console.wire.rows import (
-    DeviceRow,
     DevicesLine,
     DoingShown,
     PlacesLine,
@@ -41,94 +42,10 @@ from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog, Sent
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
-from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.facts import Fact
 from dva_sim.recordings.event_moments import ROUNDED, statuses_at
 from dva_sim.recordings.reading import Opened, RecordedHazard
-from dva_sim.simulation.full.stage import dvas_of
 from dva_sim.simulation.scenario import plan_of, robot_profiles
-
-BEATING = 10.0  # over which heartbeats are counted [s]
-
-
-class RecordedDevices:
-    """Devices registered at the DVAs, and the times at which each was heard.
-
-    Args:
-        traffic: All messages of a run, by time.
-        dvas: Labels of the DVAs, by id.
-    """
-
-    def __init__(self, traffic: Iterable[Sent], dvas: Mapping[str, str]) -> None:
-        self._dvas = dvas
-        self._registered: dict[str, list[tuple[float, str, m.Registration]]] = {}  # time, DVA
-        self._heard: dict[str, list[float]] = {}
-        self._beats: dict[str, list[float]] = {}
-        for sent in traffic:
-            if sent.destination in dvas and isinstance(sent.payload, bytes):
-                self._take(sent)
-
-    def _take(self, sent: Sent) -> None:
-        who = sent.source
-        data = sent.payload
-        self._heard.setdefault(who, []).append(sent.time)
-        if b"<HBMsg>" in data:
-            self._beats.setdefault(who, []).append(sent.time)
-        elif b"<RegMsg>" in data:
-            try:
-                body = decode(data).body
-            except ProtocolError:
-                return
-            moves = self._registered.setdefault(who, [])
-            is_news = not moves or moves[-1][1] != sent.destination  # else it is a renewal
-            if isinstance(body, m.Registration) and is_news:
-                moves.append((sent.time, sent.destination, body))
-
-    def rows(
-        self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]
-    ) -> list[DeviceRow]:
-        """Return a row for each that had registered by then; what nobody recorded is open.
-
-        Args:
-            now: The moment [s].
-            robots: State of robots, by id.
-            doing: Activities of the people and robots on site, by label.
-        """
-        past = {who: [r for r in each if r[0] <= now] for who, each in self._registered.items()}
-        return [
-            self._row(who, *each[-1][1:], now, robots.get(who), doing)
-            for who, each in past.items()
-            if each
-        ]
-
-    def _row(
-        self,
-        who: str,
-        dva: str,
-        about: m.Registration,
-        now: float,
-        robot: RobotRow | None,
-        doing: Mapping[str, str],
-    ) -> DeviceRow:
-        heard = self._heard[who]
-        beats = self._beats.get(who, [])
-        last = heard[bisect_right(heard, now) - 1]
-        recent = bisect_right(beats, now) - bisect_right(beats, now - BEATING)
-        row = device_row(
-            m.Device(who, about.label, about.device_type, about.address),
-            doing=doing.get(about.label),
-            heard_s=now - last,
-            silent=False,
-            beats_hz=recent / BEATING,
-            holder=None if robot is None else robot["holder"],
-            holder_label=None if robot is None else robot["holder_label"],
-            dva=None if who in self._dvas else self._dvas[dva],
-        )
-        row["link"] = None
-        row["revocable"] = False
-        row["commands_hz"] = None if robot is None else robot["commands_hz"]
-        return row
-
 
 TURNING = 0.25  # over which a turn rate is measured [s]
 STORY_KEPT = 200  # lines of the story up to a moment
@@ -149,6 +66,7 @@ class RecordedRun:
         numbers: By which lines call them, by id and by label.
         duration: Length [s].
         audit: The rows of the console's audit log, if it had one.
+        system: Devices and DVAs, by their messages.
         tracks: Tracks of everybody.
     """
 
@@ -167,8 +85,7 @@ class RecordedRun:
         for drive in playback.recorder.drives:
             self._drives.setdefault(drive.robot, []).append(drive)
         self._facts = playback.facts or _facts_heard(playback.recorder.traffic or ())
-        self._windows: dict[str, RobotLines] = {}
-        self._devices: RecordedDevices | None = None
+        self.system = RecordedSystem(playback, self._look)
         self._hazards = HazardFeed(
             playback.site,
             incidents=playback.incidents,
@@ -272,59 +189,46 @@ class RecordedRun:
 
     def robots(self, now: float) -> list[RobotRow]:
         """Return a row for each robot."""
-        doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
-        return [
-            self._robot(id_tag, doing.get(self.playback.labels[id_tag], ""), now)
-            for id_tag in self.playback.radii
-        ]
+        return [self._robot(id_tag, now) for id_tag in self.playback.radii]
 
-    def _robot(self, id_tag: str, mode: str, now: float) -> RobotRow:
+    def _robot(self, id_tag: str, now: float) -> RobotRow:
+        """Return a robot as it said itself, with what is recorded of its drive."""
+        state = self.system.device(id_tag, now)
+        row = robot_row(state, self.numbers[id_tag], now, self.playback.labels)
+        row["pattern"] = self.playback.scenario.pattern
+        row["silent"] = self.system.is_lost(state, now)
+        del row["camera"]  # its pictures are drawn here
         drive = self._drive_of(id_tag, now)
-        speed, turn_rate = set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
-        holder = None if drive is None else drive.operator
-        emergency = self._lines_of(id_tag).emergency(now)
-        return {
-            "i": self.numbers[id_tag],
-            "mode": EMERGENCY if emergency is not None else mode or "Idle",
-            "emergency": emergency,
-            "pattern": self.playback.scenario.pattern,
-            "battery": None,
-            "holder": holder,
-            "holder_label": holder and self.playback.labels.get(holder, holder),
-            "session_age_s": None if drive is None else round(now - drive.ordered, 1),
-            "watchdog_left_s": None,
-            "stop_reason": "",
-            "set_speed_mps": round(speed, 3),
-            "set_turn_rate_radps": round(turn_rate, 3),
-            "queue": 0,
-            "lost": 0,
-            "commands_hz": 0.0 if drive is None else commands_hz(drive, now),
-            "refused": 0,
-            "timeouts": 0,
-        }
+        if drive is not None:
+            is_driven = row["mode"] == Mode.TELEOPERATION.value
+            speed, turn_rate = set_point(drive if is_driven else None, now)
+            row["set_speed_mps"], row["set_turn_rate_radps"] = round(speed, 3), round(turn_rate, 3)
+            row["commands_hz"] = commands_hz(drive, now)
+        return row
+
+    def _look(self, device: str, now: float) -> Status | None:
+        """Return the status of a device by its track; None if it has none then."""
+        place = self.tracks.place(self.playback.labels.get(device, ""), now)
+        if place is None:
+            return None
+        at, speed = place
+        position = m.Position(*self.playback.site.frame.to_latlon(at.x, at.y))
+        if device not in self.playback.radii:
+            return m.PersonStatus(at.mode, position)
+        return m.RobotStatus(at.mode, position, at.heading, speed, 0.0, 0)
 
     def window(self, id_tag: str, now: float) -> RobotWindowLine:
         """Return the contents of a robot's windows."""
         label = self.playback.labels[id_tag]
-        here = {name: (at, speed) for name, at, speed in self.tracks.places(now)}
-        before = {name: at for name, at, _ in self.tracks.places(now - TURNING)}
-        at, speed = here.get(label, (None, 0.0))
+        here = self.tracks.place(label, now)
+        before = self.tracks.place(label, now - TURNING)
         turned = 0.0
-        if at is not None and label in before:
-            turned = math.remainder(at.heading - before[label].heading, 2.0 * math.pi) / TURNING
-        row = self._robot(id_tag, "" if at is None else at.mode, now)
-        return self._lines_of(id_tag).line(row, speed, turned, now)
-
-    def _lines_of(self, id_tag: str) -> RobotLines:
-        if id_tag not in self._windows:
-            playback = self.playback
-            self._windows[id_tag] = RobotLines(
-                self._drives.get(id_tag, []),
-                playback.recorder.traffic or (),
-                id_tag,
-                playback.labels,
-            )
-        return self._windows[id_tag]
+        if here and before:
+            turned = math.remainder(here[0].heading - before[0].heading, 2.0 * math.pi) / TURNING
+        row = self._robot(id_tag, now)
+        drives = self._drives.get(id_tag, ())
+        speed = here[1] if here else 0.0
+        return robot_window(row, drives, speed=speed, turn_rate=turned, now=now)
 
     def _drive_of(self, robot: str, now: float) -> DriveLog | None:
         """Return the drive that goes on, if one does."""
@@ -345,13 +249,18 @@ class RecordedRun:
 
     def devices(self, now: float) -> DevicesLine:
         """Return the table of devices."""
-        if self._devices is None:
-            traffic = self.playback.recorder.traffic or ()
-            self._devices = RecordedDevices(traffic, dvas_of(self.playback.scenario))
-        ids = {thing["i"]: thing["id"] for thing in self.things.all}
-        robots = {ids[row["i"]]: row for row in self.robots(now)}
-        doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
-        rows = self._devices.rows(now, robots, doing)
+        system = self.system
+        rows = [
+            listed_device_row(
+                state,
+                now,
+                self.playback.labels,
+                is_lost=system.is_lost(state, now),
+                is_fake=False,
+                may_revoke=False,
+            )
+            for state in system.devices(now)
+        ]
         return {"k": "devices", "t": _ms(now), "devices": rows}
 
     def hazards(self, now: float) -> HazardsLine:

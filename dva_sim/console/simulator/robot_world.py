@@ -22,7 +22,7 @@ from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.system.system_state import DeviceState
-from dva_sim.console.views.feed import Feed, device_of
+from dva_sim.console.views.feed import Feed, device_of, story_of
 from dva_sim.console.views.logs import Logs
 from dva_sim.console.views.news import News, clock_shown
 from dva_sim.console.views.published_rows import positions, robot_row
@@ -246,7 +246,7 @@ class RobotWorld:
     def _row(self, robot: str) -> RobotRow:
         """Return the row of the robot, by what it would report now: nobody else is here."""
         row = robot_row(self._state(), self.feed.numbers[robot], self.clock.now, self.stage.labels)
-        row["pattern"] = self.feed.pattern_of(robot)
+        row["pattern"] = self.stage.pattern_name(robot)
         self.feed.complete(robot, row)
         if self.station.state != LISTENING:
             row["stop_reason"] = f"it is {self.station.state}"
@@ -276,7 +276,7 @@ class RobotWorld:
             self._news.tell(line)
 
     def _tell_news(self) -> None:
-        for line in self.feed.story():
+        for line in story_of(self.recorder):
             self.tell(line)
         if self.audited is not None:
             self._news.tell(self.audited.keeper.line(self.feed.now_ms))

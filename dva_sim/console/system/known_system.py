@@ -275,9 +275,11 @@ class KnownSystem:
         if self.clock.now - self._forgotten < RENEW_PERIOD + POLL:
             return False
         entry = self.state.devices.get(id_tag)
-        if entry is None:
-            return id_tag in self._met
-        return entry.listed < self._listed.get(entry.dva, -math.inf)
+        return (
+            id_tag in self._met
+            if entry is None
+            else entry.listed < self._listed.get(entry.dva, -math.inf)
+        )
 
     def dva_of(self, id_tag: str) -> str | None:
         """Return the id of the DVA that lists a device; None if none does."""

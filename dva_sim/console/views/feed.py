@@ -83,17 +83,21 @@ class Feed(BenchView):
 
     @override
     def status(self, device: str) -> Status | None:
-        run = self._run
-        robot = run.field.robots.get(device)
-        if robot is not None:
-            run.field.world.advance_to(run.clock.now)
-            body = robot.body
-            x, y, heading = body.pose()
-            mode = robot.controller.mode.value
-            position = m.Position(*run.stage.site.frame.to_latlon(x, y))
-            tick = robot.controller.tick(run.clock.now)
-            return m.RobotStatus(mode, position, heading, body.speed, body.turn_rate, tick)
-        return None
+        field = self._run.field
+        now = self._run.clock.now
+        robot = field.robots.get(device)
+        if robot is None:
+            return None
+        field.world.advance_to(now)
+        x, y, heading = robot.body.pose()
+        return m.RobotStatus(
+            robot.controller.mode.value,
+            m.Position(*self._run.stage.site.frame.to_latlon(x, y)),
+            heading,
+            robot.body.speed,
+            robot.body.turn_rate,
+            robot.controller.tick(now),
+        )
 
     @override
     def places(self) -> list[list[int]]:
@@ -157,16 +161,6 @@ class Feed(BenchView):
                 rate = self._rates.setdefault(id_tag, Rate())
                 self._commands_hz[id_tag] = round(rate.of(agent.applied, now), 1)
         return self._commands_hz[robot]
-
-    def pattern_of(self, robot: str) -> str:
-        """Return the name of the pattern by which a robot is driven next, or now."""
-        return self._run.stage.pattern_name(robot)
-
-    # --- what happens ----------------------------------------------------------------------
-
-    def story(self) -> Iterator[StoryLine]:
-        """Yield the story since the last call; it is forgotten then."""
-        return story_of(self._run.recorder)
 
 
 def device_of(device: AgentDevice) -> m.Device:

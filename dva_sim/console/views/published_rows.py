@@ -88,29 +88,17 @@ def robot_row(
     held = holding is not None and holding.holder is not None
     is_driven = mode == Mode.TELEOPERATION.value
     is_unheard = device_state.heard is not None and now - device_state.heard > SILENT_AFTER
+    emergency = emergency_of(device_state, now, stoppers)
     return {
-        **_unknown_robot(number, mode or "unknown", emergency_of(device_state, now, stoppers)),
+        "i": number,
+        "mode": (mode or "unknown") if emergency is None else EMERGENCY,
+        "emergency": emergency,
         "stop_reason": UNHEARD if is_driven and is_unheard else "",
+        "pattern": None,
+        "battery": None,
         "holder": holding.holder if holding is not None else None,
         "holder_label": holder_named(holding, labels),
         "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
-        "camera": device_state.camera,
-        "sensors": readings_of(device_state, now),
-    }
-
-
-def _unknown_robot(number: int, mode: str, emergency: EmergencyShown | None) -> RobotRow:
-    """Return a robot of which little is known; what is not is null."""
-    return {
-        "i": number,
-        "mode": mode if emergency is None else EMERGENCY,
-        "emergency": emergency,
-        "stop_reason": "",
-        "pattern": None,
-        "battery": None,
-        "holder": None,
-        "holder_label": None,
-        "session_age_s": None,
         "watchdog_left_s": None,
         "set_speed_mps": None,
         "set_turn_rate_radps": None,
@@ -119,7 +107,8 @@ def _unknown_robot(number: int, mode: str, emergency: EmergencyShown | None) -> 
         "commands_hz": None,
         "refused": None,
         "timeouts": None,
-        "camera": None,
+        "camera": device_state.camera,
+        "sensors": readings_of(device_state, now),
     }
 
 

@@ -165,7 +165,7 @@ class KeptResults:
             for seat, person in world.seating.persons.items()
         }
         number = self._number(clients.get(log.operator) or log.operator)
-        pattern = world.feed.pattern_of(log.robot)
+        pattern = world.run.stage.pattern_name(log.robot)
         delay = float(world.sliders.line().get("delay_s", math.nan))
         by = log.by._replace(person=f"person-{number}", pattern=pattern, link_delay_s=delay)
         if phone is not None:

@@ -2,6 +2,8 @@
 
 import pytest
 from helpers.console.declared_lines import checked
+from helpers.console.recorded_console import RecordedPage
+from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.console.replay.player import Player
 from dva_sim.console.replay.recorded_run import RecordedRun
@@ -44,14 +46,33 @@ def test_each_moment_shows_with_whom_a_device_was_registered(recorded):
     assert dva_of("guard-1", 15.0) == "dva-east"
     assert dva_of("guard-1", 45.0) == "dva-west"
     assert dva_of("robot-1", 45.0) == "dva-west"
-    assert dva_of("dva-east", 15.0) is None
 
 
-def test_the_map_has_the_borders_and_claims_nothing_of_who_serves_what(recorded):
+def states(run: RecordedRun, now: float) -> dict[str, str]:
+    return {row["name"]: row["state"] for row in run.system.regions(now)}
+
+
+def test_each_moment_shows_who_serves_the_regions(monkeypatch, tmp_path):
+    page = PhonePage(monkeypatch, scenario=HALL)
+    kept = RecordedPage(page, tmp_path / "own.mcap")
+    page.let(45.0)
+    kept.finish()
+    run = RecordedRun(read_recording(tmp_path / "own.mcap"), "own.mcap")
+    assert states(run, 1.0) == states(run, 15.0) == {"west": "served", "east": "served"}
+    assert states(run, 27.0) == {"west": "served", "east": "dead"}
+    assert states(run, 44.0) == {"west": "served", "east": "deputy"}
+
+
+def test_the_last_dva_whom_nobody_hears_is_not_called_dead(recorded):
+    assert states(recorded, 15.0) == {"west": "served", "east": "served"}
+    assert states(recorded, 27.0) == {}
+
+
+def test_the_map_has_the_borders(recorded):
     lines = {}
     player = Player(recorded)
     player.tell = lambda line, key="": lines.update({line["k"]: checked(line)})
     player.begin()
     assert [one["name"] for one in lines["scene"]["site"]["regions"]] == ["west", "east"]
-    assert "regions" not in lines["rows"]
+    assert [one["name"] for one in lines["rows"]["regions"]] == ["west", "east"]
     player.close()
