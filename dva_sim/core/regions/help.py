@@ -18,6 +18,7 @@ from dva_sim.protocol import messages as m
 
 ASK_AFTER: Final = 5.0  # design: an event for which nobody was free for so long needs help [s]
 KNOWN_FOR: Final = 5.0  # design: a DVA is asked that has said what it serves since then [s]
+ORPHANED_AFTER: Final = 10.0  # design: who was started again asks anew within this time [s]
 SEVERITY: Final = 0.5  # of a copy: an order does not say it
 _FINDINGS: Final = {State.CONFIRMED: "confirmed", State.REFUTED: "refuted"}
 
@@ -51,6 +52,7 @@ class MutualHelp:
     told: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, list[Send]] = field(default_factory=dict)
     _news: dict[int, list[str]] = field(default_factory=dict)
+    _forgotten: dict[int, float] = field(default_factory=dict)  # since when, by copy [s]
 
     # --- asked for -----------------------------------------------------------------------
 
@@ -90,6 +92,7 @@ class MutualHelp:
         known = next((n for n, lent in self.copies.items() if lent.number == order.event_id), None)
         if known is not None:  # who asks may have taken the event over
             self.copies[known] = Lent(asker, order.event_id)
+            self._forgotten.pop(known, None)
         if self.copy_of(asker, order.event_id) is not None:
             return DvaAnswer()
         if not self.dispatcher.situations.idle(now):
@@ -120,7 +123,17 @@ class MutualHelp:
         self.adopted.add(number)
         self._drop(number)
 
+    def forgotten_by(self, asker: str, now: float) -> None:
+        """Note that a DVA was started again, and may not know what it has asked for."""
+        self._forgotten |= {n: now for n, lent in self.copies.items() if lent.asker == asker}
+
+    def adopt_orphans(self, now: float) -> None:
+        """Keep the copies that nobody has asked for again: they are passed on to their DVA."""
+        for number in [n for n, at in self._forgotten.items() if now - at > ORPHANED_AFTER]:
+            self.adopt(number)
+
     def _drop(self, number: int) -> None:
+        self._forgotten.pop(number, None)
         del self.copies[number]
         self._news.pop(number, None)
 

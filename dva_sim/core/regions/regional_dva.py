@@ -140,6 +140,7 @@ class RegionalDva(Dva):
         self.deputy.resume(now)
         self._copy_to_new_deputies()
         self.leases.lapse(now)
+        self.help.adopt_orphans(now)
         sends = super().tick(now)
         sends += self.borders.cross(now)
         sends += self.help.ask(now)
@@ -155,6 +156,7 @@ class RegionalDva(Dva):
         if is_new and isinstance(body, m.Registration) and body.device_type == PEER:
             self._deputies.clear()
             self.deputy.replace_restarted(message.source, now)
+            self.help.forgotten_by(message.source, now)
             known = dict.fromkeys(self.division.lines, FIRST_EPOCH)
             returned = self.deputy.return_copies(message.source, known, now)
             answer = super()._answer(message, now)

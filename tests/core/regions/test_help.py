@@ -79,6 +79,34 @@ def test_who_takes_an_event_over_is_helped_by_those_who_are_on_the_way_already()
     assert len(street.told(GUARD, m.Order)) == 1
 
 
+def asked_by_one_that_is_started_again():
+    """A street whose western DVA has asked for help, and is started again without its events."""
+    street = lent()
+    street.cores[WEST] = street.new_core(WEST, life=1)
+    street.register(WEST, EAST, "DVA")
+    street.number = 0
+    street.register(EAST, WEST, "DVA")
+    return street
+
+
+def test_help_that_was_asked_for_in_a_life_before_is_passed_on_as_an_event_to_who_asked():
+    street = asked_by_one_that_is_started_again()
+    street.tick(9, GUARD)
+    assert list(street.cores[EAST].help.copies) == [1_000_001]
+    street.tick(3, GUARD)
+    assert not street.cores[EAST].help.copies
+    (event,) = street.cores[WEST].events.open.values()
+    assert (event.kind, event.position) == ("fire", east(10))
+    assert street.cores[EAST].counters["event passed on"] == 1
+
+
+def test_help_that_is_asked_for_again_after_a_restart_goes_on():
+    street = asked_by_one_that_is_started_again()
+    assert street.say(EAST, WEST, m.Order(1, "fire", east(10), None)).code == m.OK
+    street.tick(12, GUARD)
+    assert street.cores[EAST].help.copies == {1_000_001: Lent(WEST, 1)}
+
+
 def test_help_that_is_needed_no_longer_comes_back():
     street = lent()
     street.cores[WEST].roles.appoint(DETECTOR, "dispatch")
