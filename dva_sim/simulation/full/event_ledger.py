@@ -205,6 +205,8 @@ class EventLedger:
                 if state not in ("departed", "arrived"):
                     self._ends(self._word(number), source)
                     self._word(number).ended.add(source)
+            case m.Replicate(event=event):  # of a DVA that may die before its book is seen
+                self._numbers[event.event_id] = None
             case m.Registration():
                 self._registered[source] = now
                 for word in self._words.values():
