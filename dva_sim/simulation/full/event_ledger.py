@@ -454,6 +454,8 @@ class EventLedger:
         self._promised[event.number] = 0.0
         word.ordered.update((device, goes or device) for device, goes in sent.items() if device)
         word.went.update(word.ordered.items())
+        for book in self._books:  # who has accepted it at another DVA, from which it was taken over
+            word.taken |= book._word(event.number).taken & word.ordered.keys()
         conclusions = FOUND.intersection((*event.times, event.state.value))
         return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))
 
