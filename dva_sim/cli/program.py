@@ -148,8 +148,8 @@ class DvaSimProgram(PanelGroup):
         try:
             early_stop.raise_again()
             return super().invoke(ctx)
-        except KeyboardInterrupt:
-            raise Stopped("stopped by Ctrl-C") from None
+        except KeyboardInterrupt as stop:
+            raise Stopped(str(stop) or early_stop.STOPPED) from None
         except BrokenPipeError:
             raise ReaderGone("nobody reads") from None
 
@@ -206,6 +206,9 @@ def call(words: Sequence[str] | None = None) -> int:
             return _report(in_a_line(error), ExitCode.MISTAKE)
         typer.echo(error)
         return ExitCode.OK
+    except MemoryError:
+        problem = "out of memory; what is finished is kept: free some, then run the command again"
+        return _report(problem, ExitCode.RUNS_FAILED)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         return _report(f"{where}{error.strerror or error}", ExitCode.MISTAKE)

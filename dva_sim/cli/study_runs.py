@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -44,10 +43,7 @@ _SURE_SHARE = 0.05
 
 def run(options: RunOptions) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
-    try:
-        results, unrecorded, report = run_study(options, _Shown(options))
-    except KeyboardInterrupt as stopped:
-        return _stopped(stopped)
+    results, unrecorded, report = run_study(options, _Shown(options))
     distrusted = results.distrusted
     for part, entry in distrusted.items():
         problem = f"in part {part} {entry}: no contrast of it is shown"
@@ -70,11 +66,8 @@ def tune(options: TuneOptions) -> ExitCode:
     say(f"[bold]{escape(trials.question)}[/bold]")
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))
-    try:
-        with _bar("trying", before.runs) as show:
-            tuned = try_all(study, folder, jobs=jobs, progress=show)
-    except KeyboardInterrupt as stopped:
-        return _stopped(stopped)
+    with _bar("trying", before.runs) as show:
+        tuned = try_all(study, folder, jobs=jobs, progress=show)
     for trial in tuned.seen:
         when = ", ".join(f"{name} {level}" for name, level in trial.when.items())
         detail(f"  {when}, {tuned.tuning.key} {trial.value:g}: {trial.mean:.4g}")
@@ -101,11 +94,8 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
     if only_plan:
         say(escape(_time(before)))
         return ExitCode.OK
-    try:
-        with _bar("screening", before.runs) as show:
-            screening = run_all(loaded, folder, jobs=jobs, progress=show)
-    except KeyboardInterrupt as stopped:
-        return _stopped(stopped)
+    with _bar("screening", before.runs) as show:
+        screening = run_all(loaded, folder, jobs=jobs, progress=show)
     for line in draw_screening(loaded, screening, folder):
         say(escape(line))
     tell_files(folder, screening.write(folder / TABLE).name)
@@ -224,13 +214,6 @@ def _time(preview: DryRun) -> str:
 
 def _counted(number: int, one: str, many: str | None = None) -> str:
     return f"{number} {one if number == 1 else many or f'{one}s'}"
-
-
-def _stopped(how: KeyboardInterrupt) -> ExitCode:
-    """Print that the study has stopped, and the command that resumes it."""
-    say(f"Stopped: {how}" if str(how) else "Stopped.")
-    say(f"To resume: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
-    return ExitCode.INTERRUPTED
 
 
 # --- progress --------------------------------------------------------------------------

@@ -67,18 +67,14 @@ def validate(options: ValidateOptions) -> ExitCode:
     for key in ("cases", "strategy", "out"):
         value = getattr(options, key)
         detail(f"  {key}: {'as shipped' if value is None else value}")
-    try:
-        if what == "dispatch":
-            return conclude(partial(_dispatch, options.cases, quick, workers, seed), out)
-        if what == "operators":
-            return conclude(partial(_operators, options.strategy, quick, workers, seed), out)
-        if options.beside is not None:
-            return conclude(partial(_beside, options.beside, quick, workers), out)
-        setting = comparison.NetworkSetting(seed, quick, workers, options.ablate)
-        return _network(options.cases, setting, options.measure, options.live, out)
-    except KeyboardInterrupt:
-        say("Stopped.")
-        return ExitCode.INTERRUPTED
+    if what == "dispatch":
+        return conclude(partial(_dispatch, options.cases, quick, workers, seed), out)
+    if what == "operators":
+        return conclude(partial(_operators, options.strategy, quick, workers, seed), out)
+    if options.beside is not None:
+        return conclude(partial(_beside, options.beside, quick, workers), out)
+    setting = comparison.NetworkSetting(seed, quick, workers, options.ablate)
+    return _network(options.cases, setting, options.measure, options.live, out)
 
 
 def _refuse_foreign(options: ValidateOptions) -> None:

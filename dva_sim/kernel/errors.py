@@ -37,7 +37,7 @@ _MEANINGS: Final = {
     ExitCode.RUNS_FAILED: "runs or tables failed (run again to retry), or a plug-in failed",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
     ExitCode.NOT_JUDGED: "facts to judge some safety rules are missing; none is broken",
-    ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live`, `console`: 0)",
+    ExitCode.INTERRUPTED: "Ctrl-C or SIGTERM; what is finished is kept (`live`, `console`: 0)",
     ExitCode.READER_GONE: "the reader of the output has ended, as in `| head`",
 }
 

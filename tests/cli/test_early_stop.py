@@ -45,7 +45,7 @@ def stopped_at(module: str, words: list[str], ignored: bool = False) -> tuple[in
     ],
 )
 def test_a_command_that_is_stopped_while_it_is_loaded_says_so_in_a_line(module, words):
-    assert stopped_at(module, words) == (130, "", "error: stopped by Ctrl-C\n")
+    assert stopped_at(module, words) == (130, "", "error: stopped; run the same command again\n")
 
 
 def test_who_ignores_ctrl_c_is_not_stopped_by_it():

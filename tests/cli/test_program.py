@@ -94,7 +94,13 @@ def test_without_a_command_the_help_is_shown(capsys):
         (RunsFailed("3 runs failed"), 3, "error: 3 runs failed"),
         (PermissionError(13, "Permission denied", "a\tb"), 2, "error: a b: Permission denied"),
         (OSError(28, "No space left on device"), 2, "error: No space left on device"),
-        (KeyboardInterrupt(), 130, "error: stopped by Ctrl-C"),
+        (KeyboardInterrupt(), 130, "error: stopped; run the same command again"),
+        (KeyboardInterrupt("stopped after 3 of 4 runs"), 130, "error: stopped after 3 of 4 runs"),
+        (
+            MemoryError(),
+            3,
+            "error: out of memory; what is finished is kept: free some, then run the command again",
+        ),
     ],
 )
 def test_what_goes_wrong_ends_in_one_line_and_its_code(monkeypatch, capsys, raised, code, line):
