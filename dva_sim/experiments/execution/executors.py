@@ -22,13 +22,20 @@ from typing import Any, ParamSpec, Self, TypeVar
 from typing_extensions import override
 
 from dva_sim.experiments.execution import worker_program
+from dva_sim.kernel.early_stop import STOPS
 from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
 from dva_sim.kernel.rare_collection import collect_rarely
 from dva_sim.serving.processes import Child, end_all
 
 
-class WorkerDied(Exception):
+class WorkerDied(RunsFailed):
     """A worker process ended while it was at work."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "a worker process was killed, or out of memory; what is finished is kept: run the "
+            "same command again"
+        )
 
 
 class WorkerProcess:
@@ -43,15 +50,20 @@ class WorkerProcess:
         with ours, theirs:
             number = theirs.fileno()
             self._file = ours.makefile("rwb")
-            self._process = Child(
-                "the worker process",
-                # -P: a file beside this one is not taken for a module of Python.
-                [sys.executable, "-P", worker_program.__file__, str(number)],
-                self._hang_up,
-                keeps_errors=False,  # what a plug-in prints is for the user
-                pass_fds=(number,),
-                start_new_session=False,  # Ctrl-Z stops all that is at work
-            )
+            # A process inherits what is blocked: Ctrl-C is for this one alone.
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                self._process = Child(
+                    "the worker process",
+                    # -P: a file beside this one is not taken for a module of Python.
+                    [sys.executable, "-P", worker_program.__file__, str(number)],
+                    self._hang_up,
+                    keeps_errors=False,  # what a plug-in prints is for the user
+                    pass_fds=(number,),
+                    start_new_session=False,  # Ctrl-Z stops all that is at work
+                )
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
         self._file.write(pickle.dumps(sys.path))
 
     def call(self, task: Callable[[], Any]) -> Any:
@@ -210,9 +222,7 @@ class LocalProcesses(Workers):
                 f"other processes know nothing of a script, so not its {defined.__qualname__} "
                 "either: put that into a module of its own, or use one process (jobs=1)"
             )
-        # What a thread starts inherits its signal mask: Ctrl-C is for this process alone.
-        mask = signal.SIG_BLOCK, {signal.SIGINT}
-        pool = _Handing(self._do, min(width, self.width), signal.pthread_sigmask, mask)
+        pool = _Handing(self._do, min(width, self.width))
         with _ctrl_c_held_back(self._kill) as self._let_through:
             try:
                 yield pool
@@ -279,8 +289,8 @@ class LocalProcesses(Workers):
 class _Handing(ThreadPoolExecutor):
     """Threads that pass tasks on to workers."""
 
-    def __init__(self, do: Callable[[Callable[[], Any]], Any], width: int, *initial: Any) -> None:
-        super().__init__(width, "worker", *initial)
+    def __init__(self, do: Callable[[Callable[[], Any]], Any], width: int) -> None:
+        super().__init__(width, "worker")
         self._do = do
 
     @override
@@ -290,7 +300,7 @@ class _Handing(ThreadPoolExecutor):
 
 @contextmanager
 def _ctrl_c_held_back(at_once: Callable[[], object]) -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C back until the block lets it through, or ends.
+    """Hold Ctrl-C and SIGTERM back until the block lets them through, or ends.
 
     Raised anywhere, it may leave a lock of the pool locked for ever: the pool's own thread would
     wait for that, and this one for the pool's.
@@ -307,12 +317,13 @@ def _ctrl_c_held_back(at_once: Callable[[], object]) -> Iterator[Callable[[], No
             raise KeyboardInterrupt
 
     is_main = threading.current_thread() is threading.main_thread()
-    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield let_through
-        return
-    signal.signal(signal.SIGINT, press)
+    raising = [n for n in STOPS if signal.getsignal(n) is signal.default_int_handler]
+    held_back = raising if is_main else []
+    for number in held_back:
+        signal.signal(number, press)
     try:
         yield let_through
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    let_through()
+        for number in held_back:
+            signal.signal(number, signal.default_int_handler)
+        let_through()  # also if workers that it has ended have raised an error

@@ -8,11 +8,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import groupby
-from multiprocessing import get_context
 from typing import Any, NamedTuple
 
+from dva_sim.experiments.execution.executors import LocalProcesses
 from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.plan import StudyPlan
@@ -76,7 +75,10 @@ def sampled_runs(
         studies: The studies.
         processes: Number of runs at a time.
     """
-    with ProcessPoolExecutor(processes, mp_context=get_context("forkserver")) as pool:
+    with (
+        LocalProcesses(processes) as workers,
+        workers.executor(processes, run_sampled) as pool,
+    ):
         samples = {
             name: pool.map(run_sampled, sampled_jobs(study)) for name, study in studies.items()
         }

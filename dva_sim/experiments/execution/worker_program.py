@@ -17,7 +17,7 @@ def serve(number: int) -> None:
     """Run tasks from a socket until the other end closes it."""
     with socket.socket(fileno=number) as channel, channel.makefile("rwb") as file:
         threading.Thread(target=_end_with_parent, args=(number,), daemon=True).start()
-        with suppress(EOFError, ConnectionError):
+        with suppress(EOFError, ConnectionError, MemoryError):
             sys.path[:] = pickle.load(file)
             while True:
                 answer = pickle.load(file)()
