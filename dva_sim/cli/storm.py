@@ -11,6 +11,7 @@ import typer
 
 from dva_sim.cli.options import Quiet
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.whole_files import write_whole
 from dva_sim.options.forms import Jobs, OptionForm, Scheduler, argument, out_form
 
 if TYPE_CHECKING:
@@ -91,8 +92,9 @@ def storm(
     played_before = 0
     failed: list[StormOutcome] = []
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
+    journal = Journal(out / "storms.jsonl")
     with workers_at(scheduler, jobs) as workers:
-        for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), workers):
+        for outcome, is_known in outcomes(numbers, profile, journal, workers):
             tally.add(outcome)
             played_before += is_known
             if not outcome.is_clean:
@@ -164,7 +166,7 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
         if abs(moment.time - when) < STORY_MARGIN_S or moment.kind == "fault"
     ]
     file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
-    file.write_text(small.text(), encoding="utf-8")
+    write_whole(file, small.text())
     typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -13,7 +14,7 @@ from typing import Any, Final
 from scipy.stats import chi2
 
 from dva_sim.experiments.execution.executors import Workers
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms.drawing import draw
 from dva_sim.storms.outcome import StormOutcome
@@ -103,14 +104,24 @@ class Journal:
         except (ValueError, KeyError, TypeError) as error:
             raise ConfigError(f"is no journal of storms: {error}", file) from None
         if rest:  # part of a line: a process was killed while it wrote
-            file.write_bytes(lines + b"\n" if lines else b"")
+            os.truncate(file, len(whole) - len(rest))
 
     def keep(self, profile: str, outcome: StormOutcome) -> None:
-        """Write down the outcome of a storm."""
+        """Write down the outcome of a storm.
+
+        Raises:
+            DvaSimError: the disk is full, or refuses to be written.
+        """
         self.outcomes[profile, outcome.seed] = outcome
         line = json.dumps({"profile": profile, **plain(outcome)})
-        with self._file.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+        try:
+            with self._file.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
+        except OSError as error:
+            raise DvaSimError(
+                f"{self._file} cannot be written: {error.strerror}; finished storms are kept: "
+                "mend that, then run the same command again"
+            ) from None
 
 
 def plain(outcome: StormOutcome) -> dict[str, Any]:

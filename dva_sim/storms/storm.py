@@ -248,6 +248,8 @@ def play(
         before(storm)
         try:
             return storm.play(enough)
+        except MemoryError:
+            raise  # this machine is at fault, not the storm
         except Exception:
             return StormOutcome(
                 plan.seed,
