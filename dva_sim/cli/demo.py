@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.console import say
 from dva_sim.cli.stories import episode
+from dva_sim.cli.verbosity import loudness
+from dva_sim.experiments.execution.executors import WorkerDied, WorkerProcess
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 from dva_sim.options.runs import EpisodeOptions
@@ -73,26 +74,35 @@ def _film_under_way(path: Path) -> Iterator[None]:
         yield
         return
     part = path.with_name(f".{path.name}")  # half a film would pass for a whole one
-    maker = subprocess.Popen(_command(part), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    teller = threading.Thread(target=_say_when_done, args=(maker, part, path), daemon=True)
-    teller.start()
+    with closing(WorkerProcess()) as maker:
+        teller = threading.Thread(target=_say_when_done, args=(maker, part, path), daemon=True)
+        teller.start()
+        try:
+            yield
+            teller.join(_PATIENCE_S)
+        finally:
+            maker.kill()
+            teller.join()
+            part.unlink(missing_ok=True)
+
+
+def _make_film(path: Path) -> str:
+    """Draw the drive as a film; return why that was not possible, if it was not."""
+    drive = EpisodeOptions(
+        SCENARIO, SEED, set=[DELAY], side_by_side=PATTERNS, inset=True, video=path
+    )
     try:
-        yield
-        teller.join(_PATIENCE_S)
-    finally:
-        maker.kill()
-        maker.wait()
-        part.unlink(missing_ok=True)
+        with loudness(quiet=True):
+            episode(EpisodeRequest(drive))
+    except (DvaSimError, OSError) as error:
+        return str(error)
+    return ""
 
 
-def _command(path: Path) -> list[str]:
-    """Return the command that makes the film, which users may give as well."""
-    drive = ["episode", SCENARIO, "--seed", str(SEED), "--set", DELAY]
-    pictures = ["--side-by-side", PATTERNS, "--inset", "--video", str(path)]
-    return [sys.executable, "-m", "dva_sim", *drive, *pictures]
-
-
-def _say_when_done(maker: subprocess.Popen[bytes], part: Path, path: Path) -> None:
-    if maker.wait() == 0:
+def _say_when_done(maker: WorkerProcess, part: Path, path: Path) -> None:
+    with suppress(WorkerDied):
+        if problem := maker.call(partial(_make_film, part)):
+            say(f"No film: {problem}")
+            return
         part.replace(path)
         say(f"Film: {path}")

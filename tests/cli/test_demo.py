@@ -1,16 +1,17 @@
 """The first minute: a picture and a story first, then a study, and a film beside it."""
 
+import time
+
 import pytest
 from helpers.wording import unnamed
 
 from dva_sim.cli import demo as module
 from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
+from dva_sim.experiments.execution.executors import WorkerProcess
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.options.studies import RunOptions
 
 pytestmark = pytest.mark.system
-
-SLEEPS = "import time; time.sleep(600)"
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool]]:
 
 
 def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monkeypatch, capsys):
-    monkeypatch.setattr(module, "_command", lambda path: ["touch", str(path)])
+    monkeypatch.setattr(module, "_make_film", touched)
     assert demo(tmp_path / "demo", jobs=1) is ExitCode.INTERRUPTED
     assert played == [(STUDY, True)]
     output = capsys.readouterr().out
@@ -35,31 +36,43 @@ def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monke
     assert output.index("about a minute") < output.index("side by side") < output.index("Film")
 
 
+def touched(path):
+    path.touch()
+    return ""
+
+
 def test_a_film_that_is_still_being_made_ends_with_the_demo(tmp_path, monkeypatch):
     makers = []
-    real = module.subprocess.Popen
 
-    def started(*args, **kwargs):
-        makers.append(real(*args, **kwargs))
+    def started():
+        makers.append(WorkerProcess())
         return makers[-1]
 
     def stop() -> None:
         with module._film_under_way(tmp_path / FILM):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(module.subprocess, "Popen", started)
-    monkeypatch.setattr(module, "_command", lambda path: [module.sys.executable, "-c", SLEEPS])
+    monkeypatch.setattr(module, "WorkerProcess", started)
+    monkeypatch.setattr(module, "_make_film", half_of_it)
     with pytest.raises(KeyboardInterrupt):
         stop()
-    assert makers[0].returncode is not None
-    assert not (tmp_path / FILM).exists()
+    assert makers[0]._process.returncode is not None
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_half_a_film_does_not_pass_for_one(tmp_path, monkeypatch):
-    half = "import sys, pathlib; pathlib.Path(sys.argv[1]).write_text('half'); sys.exit(1)"
-    monkeypatch.setattr(
-        module, "_command", lambda path: [module.sys.executable, "-c", half, str(path)]
-    )
+def half_of_it(path):
+    path.write_text("half")
+    time.sleep(600)
+
+
+def test_half_a_film_does_not_pass_for_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "_make_film", full_disk)
     with module._film_under_way(tmp_path / FILM):
         pass
     assert list(tmp_path.iterdir()) == []
+    assert "No film: the disk is full" in capsys.readouterr().out
+
+
+def full_disk(path):
+    path.write_text("half")
+    return "the disk is full"
