@@ -176,6 +176,9 @@ def _program(
     """Test surveillance teams of people and teleoperated robots."""
 
 
+_NO_MEMORY = re.compile("map segment|start new thread|annot allocate memory|ut of memory")
+"""Errors of libraries that found none."""
+
 app = typer_of(DvaSimProgram, add_completion=True)
 app.callback()(_program)
 
@@ -206,12 +209,14 @@ def call(words: Sequence[str] | None = None) -> int:
             return _report(in_a_line(error), ExitCode.MISTAKE)
         typer.echo(error)
         return ExitCode.OK
-    except MemoryError:
-        problem = "out of memory; what is finished is kept: free some, then run the command again"
-        return _report(problem, ExitCode.RUNS_FAILED)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         return _report(f"{where}{error.strerror or error}", ExitCode.MISTAKE)
+    except Exception as error:
+        if not isinstance(error, MemoryError) and not _NO_MEMORY.search(str(error)):
+            raise
+        problem = "out of memory; what is finished is kept: free some, then run the command again"
+        return _report(problem, ExitCode.RUNS_FAILED)
 
 
 def _report(problem: object, code: int) -> int:

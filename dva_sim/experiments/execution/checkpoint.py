@@ -68,6 +68,10 @@ class RunOutcome:
     error: str | None = None
 
 
+class NotBegun(ConfigError):
+    """A journal of nothing: its study was stopped as it began."""
+
+
 class Checkpoint:
     """The runs of one study, in a SQLite file in WAL mode: one row for each.
 
@@ -83,6 +87,7 @@ class Checkpoint:
 
     Raises:
         ConfigError: the checkpoint is another study's, or not a checkpoint.
+        NotBegun: it is to be read, and holds nothing yet.
         DvaSimError: it cannot be written, or another program holds it.
     """
 
@@ -228,6 +233,8 @@ class Checkpoint:
         try:
             yield
         except sqlite3.OperationalError as error:
+            if "no such table: study" in str(error):
+                raise NotBegun("holds no run yet; run the study again", self.path) from None
             raise DvaSimError(f"{self.path}: {_remedy(str(error))}") from None
         except (sqlite3.DatabaseError, TypeError, ValueError, RecursionError) as error:
             raise ConfigError(
@@ -242,7 +249,10 @@ def _remedy(problem: str) -> str:
     if "locked" in problem:
         return f"held by another program for more than {_PATIENCE_S:g} s; try again later"
     if "readonly" in problem or "unable to open" in problem:
-        return f"cannot be written ({problem}): is the folder read-only?"
+        return (
+            f"cannot be written ({problem}): is the folder read-only? finished runs are kept: "
+            "mend that, then run the command again"
+        )
     if "I/O" in problem:
         return f"{problem}: is the disk full or gone? finished runs are kept: run the command again"
     return problem

@@ -7,12 +7,13 @@ import re
 import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.checkpoint import Checkpoint
+from dva_sim.experiments.execution.checkpoint import Checkpoint, NotBegun
 from dva_sim.experiments.execution.scheduling import Simulate, clock_of, limited
 from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.results.results import JOURNAL
@@ -94,7 +95,7 @@ def dry_run(
     wall = 0.0
     if (Path(out) / JOURNAL).exists():
         identity = manifest_of(plan)["hash"]
-        with Checkpoint(Path(out), identity, must_exist=True) as checkpoint:
+        with suppress(NotBegun), Checkpoint(Path(out), identity, must_exist=True) as checkpoint:
             costs = checkpoint.costs()
             wall = checkpoint.wall_s
     left = [job for job in todo if job.key not in costs]

@@ -122,7 +122,9 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
     try:
         write_whole(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
     except OSError as error:
-        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+        raise DvaSimError(
+            f"{path} cannot be written: {error.strerror}; mend that, then run the command again"
+        ) from None
 
 
 def status_of(manifest: Mapping[str, Any]) -> Status:

@@ -88,9 +88,11 @@ class Programs:
         self._mark = f"DVA_SIM_TEST={secrets.token_hex(16)}"
         self._started: list[Program] = []
 
-    def start(self, *words: str | Path) -> Program:
+    def start(self, *words: str | Path, **more: str) -> Program:
+        """Start `dva-sim WORDS`, with more in its environment."""
         name, _, value = self._mark.partition("=")
-        environment = {**os.environ, name: value, "COLUMNS": WIDE, "PYTHONUNBUFFERED": "1"}
+        usual = {**os.environ, name: value, "COLUMNS": WIDE, "PYTHONUNBUFFERED": "1"}
+        environment = usual | more
         program = Program(tuple(map(str, words)), self._folder, environment)
         self._started.append(program)
         return program
