@@ -12,7 +12,7 @@ DEMO := results/demo
 SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms mutants soak fuzz tools check docs release-check same-bytes statements bench budget goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms mutants soak kills fuzz tools check docs release-check same-bytes statements bench budget goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -74,6 +74,9 @@ mutants: $(DEV)  ## whether tests notice planted faults: make mutants ROOM=core 
 
 soak: $(DEV)  ## live runs for hours, with load, faults and visitors: make soak HOURS=2 SEED=1 HOUR=1
 	@$(BIN)/python tests/soak.py --hours $(or $(HOURS),1) --seed $(or $(SEED),1) --hour $(or $(HOUR),1)
+
+kills: $(DEV)  ## commands killed, stopped, without disk or memory at each step: make kills ONLY="full disk"
+	@$(BIN)/python tests/kill_all.py --only "$(ONLY)"
 
 fuzz: $(RUNTIME)  ## damaged files and messages, read and used within limits: make fuzz COUNT=2000 SEED=1
 	@$(BIN)/python tests/fuzz/fuzz_files.py --count $(or $(COUNT),2000) --seed $(or $(SEED),1) --keep results/fuzz

@@ -2,6 +2,7 @@
 
 Python imports this first, in each process that inherits `DVA_SIM_STOPS`: part of a command line, an
 event of `sys.audit`, part of its arguments, the number, and the file that then names the process.
+The statements in `DVA_SIM_PLANTED`, if there are any, are a fault for tests of kills themselves.
 """
 
 import json
@@ -26,5 +27,6 @@ def look(name: str, arguments: tuple[object, ...]) -> None:
             os.kill(os.getpid(), signal.SIGSTOP)
 
 
+exec(os.environ.get("DVA_SIM_PLANTED", ""))
 if program in " ".join(sys.orig_argv):
     sys.addaudithook(look)
