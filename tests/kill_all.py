@@ -8,6 +8,7 @@ Disks that are full or read-only need a mount of their own, which is seen by thi
 import argparse
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -27,6 +28,9 @@ def main() -> int:
     if INSIDE not in os.environ and mounts_are_allowed():
         os.environ[INSIDE] = "1"
         os.execvp(NAMESPACE[0], [*NAMESPACE, sys.executable, *sys.argv])
+    # What a script starts with `&` ignores Ctrl-C, and so would all that is started here.
+    for stop in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(stop, signal.default_int_handler)
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
         quiet = wish.quiet_runs or Path(folder) / "quiet"

@@ -192,39 +192,6 @@ def test_a_run_can_be_interrupted_before_anything_has_happened(programs):
     assert programs.processes() == {}
 
 
-def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_replayed(
-    programs, tmp_path
-):
-    run = programs.start(*SCRIPTED, "--record", "run.mcap")
-    run.wait_to_say("mode Teleoperation")
-    run.send(signal.SIGKILL)
-    assert run.ends() == -signal.SIGKILL
-    programs.wait_for_none()
-    again = call(*SCRIPTED, "--record", "run.mcap", cwd=tmp_path)
-    assert again.returncode == 2
-    assert unnamed(again.stderr, "run.mcap.part", "dva-sim replay") == []
-    left = (tmp_path / "run.mcap.part").read_bytes()
-    ended = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
-    assert ended.returncode == 0, ended.stderr
-    assert "mode Teleoperation" in ended.stdout
-    assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
-    assert (tmp_path / "run.mcap.part").read_bytes() == left
-
-
-@pytest.mark.parametrize("part", ["world", "operator"])
-def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(programs, tmp_path, part):
-    run = programs.start(*SCRIPTED, "--record", "run.mcap")
-    run.wait_to_say("mode Teleoperation")
-    os.kill(programs.process_of(part), signal.SIGKILL)
-    assert run.ends() == 3
-    name = "operator-1" if part == "operator" else part
-    (complaint,) = run.complained
-    assert unnamed(complaint, f"error: {name} has ended by itself: killed by signal 9") == []
-    assert programs.processes() == {}
-    assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
-    assert set(read_recording(tmp_path / "run.mcap").traces) == {"dva", "robot-1"}
-
-
 # --- mistakes ------------------------------------------------------------------------------
 
 

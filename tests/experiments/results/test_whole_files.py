@@ -3,13 +3,9 @@
 import csv
 import errno
 import os
-import signal
-import subprocess
-import sys
 from contextlib import suppress
 
 import pytest
-from helpers.paths import PYTHON_PATH
 from helpers.processes.command_line import call
 from helpers.studies import small_study as kit
 from helpers.studies.small_study import run_study
@@ -52,39 +48,6 @@ def test_a_full_disk_leaves_the_report_that_was_there(finished, monkeypatch):
     with pytest.raises(DvaSimError, match="No space"):
         report.write_report(finished)
     assert (finished / report.PAGE).read_bytes() == before
-
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from dva_sim.experiments.report import report
-from dva_sim.kernel import whole_files
-
-def dies(path, content):
-    with whole_files.whole(path) as part:
-        part.write_bytes(b"")
-        if path.name == sys.argv[2]:
-            os.kill(os.getpid(), signal.SIGKILL)
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
-
-report.write_whole = dies
-report.write_report(Path(sys.argv[1]))
-"""
-
-
-@pytest.mark.system
-@pytest.mark.parametrize("at", [report.PAGE, "answer.png"])
-def test_a_report_that_is_killed_leaves_nothing_empty(finished, at):
-    before = report.write_report(finished).read_bytes()
-    words = [sys.executable, "-c", KILLED, str(finished), at]
-    ended = subprocess.run(words, env=os.environ | {"PYTHONPATH": PYTHON_PATH}, check=False)
-    assert ended.returncode == -signal.SIGKILL
-    assert (finished / report.PAGE).read_bytes() == before
-    shown = [each for each in (finished / report.FIGURES).iterdir() if each.name[0] != "."]
-    assert shown
-    assert all(each.stat().st_size for each in shown)
-    report.write_report(finished)
-    assert not [each for each in finished.rglob(".*") if each.suffix in (".html", ".png")]
 
 
 @pytest.mark.parametrize("name", ["what?", "all*", "some[1]", "it's", "ein Übel"])

@@ -119,10 +119,12 @@ def wrong_recording(programs: Programs, program: Program, subject: Subject) -> I
         again = programs.start(*subject.words)
         if again.ends() != 2 or "dva-sim replay" not in "".join(again.complained):
             yield f"the next start says {again.complained}"
-        file = out / "cut.mcap"
+        file, left = out / "cut.mcap", part.read_bytes()
         replayed = call("replay", part, "--mcap", file)
         if replayed.returncode not in JUDGED:
             yield f"replay of {part.name}: {replayed.stderr}"
+        if part.read_bytes() != left:
+            yield f"replay has changed {part.name}"
     for path in (file, *out.glob("audit.sqlite")):
         if (checked := call("check", path)).returncode not in JUDGED:
             yield f"check {path.name}: {checked.stdout} {checked.stderr}"

@@ -1,16 +1,14 @@
-"""A study that is killed at any moment, or runs out of disk, until it has come to its end.
+"""A study that is killed at any moment, until it has come to its end.
 
-Run as `python -m helpers.studies.interrupted_study kills FOLDER` or `... disk FOLDER` (in a mount
-namespace of its own); it prints what happened as JSON. Children are forked: a kill costs no start.
+Run as `python -m helpers.studies.interrupted_study FOLDER`; it prints what happened as JSON.
+Children are forked: a kill costs no start.
 """
 
 import json
 import os
 import random
-import shutil
 import signal
 import sqlite3
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -21,16 +19,13 @@ from typing import Any
 from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import session
-from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.study.cell_grid import StudyJob
-from dva_sim.kernel.errors import DvaSimError
 
 KILLS_EACH = 40
 KILLS_A_STUDY = 10
 PAIRS = 10
 SEED = 1
-STEP_KB = 16
 
 
 def run(out: Path, study: Any) -> None:
@@ -210,55 +205,5 @@ def pairs(folder: Path, study: Any, whole: Any, calls: int, rng: random.Random) 
     return dict(seen)
 
 
-# --- a full disk -----------------------------------------------------------------------
-
-
-def disk(folder: Path) -> dict[str, Any]:
-    """Give the disk a little more each time that it was full."""
-    study, reports = kit.study_in(folder), []
-    plain = folder / "plain"
-    run(plain, study)
-    small = folder / "small"
-    small.mkdir()
-    size = STEP_KB
-    mount(small, size)
-    while True:
-        try:
-            run(small / "out", study)
-            break
-        except DvaSimError as error:
-            reports.append(str(error))
-        size += STEP_KB
-        mount(small, size, "remount")
-    equal = kit.files(small / "out") == kit.files(plain)
-    (small / "ballast").write_bytes(bytes(shutil.disk_usage(small).free))
-    report = errors_of(lambda: write_report(small / "out"))
-    (small / "ballast").unlink()
-    mount(small, 64 * 1024, "remount")
-    write_report(small / "out")
-    write_report(plain)
-    pages = {(folder / "report.html").read_bytes() for folder in (small / "out", plain)}
-    return {
-        "errors": reports,
-        "equal": equal,
-        "report": report,
-        "report equal": len(pages) == 1,
-        "left behind": [p.name for p in (small / "out").iterdir() if p.name.startswith(".")],
-    }
-
-
-def mount(where: Path, size_kb: int, *options: str) -> None:
-    words = ",".join([*options, f"size={size_kb}k"])
-    subprocess.run(["mount", "-t", "tmpfs", "-o", words, "tmpfs", where], check=True)
-
-
-def errors_of(work: Callable[[], object]) -> str:
-    try:
-        work()
-    except DvaSimError as error:
-        return str(error)
-    return ""
-
-
 if __name__ == "__main__":
-    print(json.dumps({"kills": kills, "disk": disk}[sys.argv[1]](Path(sys.argv[2]))))
+    print(json.dumps(kills(Path(sys.argv[1]))))
