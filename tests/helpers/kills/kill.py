@@ -24,6 +24,7 @@ NAMESPACE = ["unshare", "--map-root-user", "--mount"]
 DISK = "size=64m"
 SPARE_MB = 1  # more memory than it has at the moment
 SAYS = "says"
+AT_END = "os.rename"  # of a recording
 ADVICE = re.compile(r"\bagain\b|dva-sim (replay|report)|has ended by itself")
 PROGRESS = re.compile(r"warning: |\d+ storms, |$")
 
@@ -116,6 +117,7 @@ DEEDS: dict[str, Callable[[Victim], object]] = {
     "clock back": sets_clock(-86_400),
     "clock forth": sets_clock(86_400),
 }
+ENDS = "INT", "TERM", "KILL"
 MOUNTS = {"full disk", "disk of 1 MB", "read-only"}
 
 
@@ -140,7 +142,7 @@ def troubles(kill: Kill, folder: Path, quiet: Path) -> list[str]:
     """Return what was wrong, a line each.
 
     Args:
-        kill: What is done to whom, and when.
+        kill: Row of the table.
         folder: Empty folder.
         quiet: Folder of runs without disturbance, which is filled as need be.
     """
@@ -165,7 +167,7 @@ def _troubles(
 ) -> Iterator[str]:
     program = programs.start(*subject.words, **_environment(kill, folder))
     if kill.deed != "disk of 1 MB":
-        if (process := _reached(kill.moment, programs, program, folder)) is None:
+        if (process := _reached(kill.moment, subject, programs, program)) is None:
             yield f"ended before that: {program.output} {program.complained}"
             return
         victim = program.process.pid if "main" in kill.deed else process
@@ -175,9 +177,8 @@ def _troubles(
             os.kill(process, signal.SIGCONT)
     else:
         is_main = True
-    if subject.ready and (is_main and kill.deed not in ("INT", "TERM", "KILL")):
-        program.wait_to_say(subject.ready)
-        program.send(signal.SIGINT)
+    if subject.ready and kill.deed not in ENDS and kill.moment.event != AT_END:
+        _ask_to_end(program, subject)
     code = program.ends()
     yield from _wrong_end(kill, subject, is_main, code, program.complained)
     programs.wait_for_none()
@@ -211,17 +212,29 @@ def _environment(kill: Kill, folder: Path) -> dict[str, str]:
     return more
 
 
-def _reached(moment: Moment, programs: Programs, program: Program, folder: Path) -> int | None:
+def _ask_to_end(program: Program, subject: Subject) -> None:
+    wait_until(lambda: subject.ready in program.output or _has_ended(program), subject.ready)
+    if not _has_ended(program):
+        program.send(signal.SIGINT)
+
+
+def _has_ended(program: Program) -> bool:
+    return program.process.poll() is not None
+
+
+def _reached(moment: Moment, subject: Subject, programs: Programs, program: Program) -> int | None:
     """Return the process that stands still at the moment; None: the program ended before it."""
-    mark = folder / "stopped"
+    mark = program.folder / "stopped"
+    if subject.ready and moment.event == AT_END:
+        _ask_to_end(program, subject)
     if moment.event == SAYS:
         program.wait_to_say(moment.word)
         commands = programs.processes().items()
         process = next(pid for pid, command in commands if moment.process in command)
         os.kill(process, signal.SIGSTOP)
         mark.write_text(str(process))
-    has_ended = lambda: program.process.poll() is not None  # noqa: E731
-    wait_until(lambda: (mark.exists() and mark.read_text()) or has_ended(), "the moment comes")
+    is_there = lambda: mark.exists() and mark.read_text()  # noqa: E731
+    wait_until(lambda: is_there() or _has_ended(program), "the moment comes")
     if not mark.exists():
         return None
     stat = Path(f"/proc/{mark.read_text()}/stat")

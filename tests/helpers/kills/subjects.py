@@ -45,10 +45,10 @@ class Subject:
 
     Attributes:
         words: Its command line.
-        product: What must be the same as without a disturbance, from its folder; None: nothing.
+        product: Files of its folder, which must be the same as without a disturbance.
         prepare: Puts into the folder what it needs.
         goes_on: The same command completes what was interrupted.
-        ready: What it says before it is asked to end; empty: it ends by itself.
+        ready: Words after which it is asked to end; empty: it ends by itself.
         worker: Exit code if one of its processes is killed.
         asked: Exit code if it is asked to end.
     """
@@ -92,7 +92,7 @@ def storms(folder: Path) -> Files:
 
 
 RECORDS = ("--record", f"{OUT}/run.mcap")
-LIVE = ("live", "drive-to-event", "--operators", "scripted", "--for", "7", *RECORDS)
+LIVE = ("live", "drive-to-event", "--operators", "scripted", *RECORDS)
 CONSOLE = ("console", "--no-open", "--no-token", "--port", "0", "--audit", f"{OUT}/audit.sqlite")
 RUN = ("run", "study.yaml", "-o", OUT)
 SUBJECTS = {
@@ -103,7 +103,7 @@ SUBJECTS = {
     "storms of workers": Subject(("storm", "--seeds", "10", "-j", "2", "-o", OUT), storms),
     "demo": Subject(("demo", "-o", OUT, "-j", "2"), results, worker=0),
     "answers": Subject(("answers", "dispatch-oracle", "-j", "2")),
-    "live": Subject(LIVE, goes_on=False, asked=0),
+    "live": Subject(LIVE, goes_on=False, ready="mode Teleoperation", asked=0),
     "console": Subject((*CONSOLE, *RECORDS), goes_on=False, ready="Console: ", asked=0),
 }
 
