@@ -170,13 +170,14 @@ def _troubles(
         if (process := _reached(kill.moment, subject, programs, program)) is None:
             yield f"ended before that: {program.output} {program.complained}"
             return
+        said = program.output
         victim = program.process.pid if "main" in kill.deed else process
         is_main = victim == program.process.pid
         DEEDS[kill.deed.removesuffix(" of main")](Victim(victim, folder / OUT))
         with suppress(ProcessLookupError):
             os.kill(process, signal.SIGCONT)
     else:
-        is_main = True
+        is_main, said = True, ""
     if subject.ready and kill.deed not in ENDS and kill.moment.event != AT_END:
         _ask_to_end(program, subject)
     code = program.ends()
@@ -184,7 +185,7 @@ def _troubles(
     programs.wait_for_none()
     mend(kill.deed, folder / OUT)
     if not subject.goes_on:
-        yield from wrong_recording(programs, program, subject)
+        yield from wrong_recording(programs, program, subject, said)
         return
     expected = undisturbed(kill.subject, quiet)
     if code == 0 and subject.product(folder) != expected:

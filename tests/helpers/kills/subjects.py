@@ -108,10 +108,12 @@ SUBJECTS = {
 }
 
 
-def wrong_recording(programs: Programs, program: Program, subject: Subject) -> Iterator[str]:
+def wrong_recording(
+    programs: Programs, program: Program, subject: Subject, said: str
+) -> Iterator[str]:
     """Look at what a live run or a console has left: its recording, its audit, its ports.
 
-    Whatever it has said is in the recording, and what is left can be replayed.
+    Whatever it had said is in the recording, and what is left can be replayed.
     """
     out = program.folder / OUT
     part, file = out / "run.mcap.part", out / "run.mcap"
@@ -130,7 +132,7 @@ def wrong_recording(programs: Programs, program: Program, subject: Subject) -> I
             yield f"check {path.name}: {checked.stdout} {checked.stderr}"
     if file.exists():
         timeline = read_recording(file).playback.recorder.timeline
-        told = re.findall(r"^ *[\d.]+ s  (.*)$", program.output, re.MULTILINE)
+        told = re.findall(r"^ *[\d.]+ s  (.*)$", said, re.MULTILINE)
         kept = {f"{moment.who:<14} {moment.what}" for moment in timeline}
         yield from sorted(f"not recorded: {line}" for line in {*told} - kept)
     for port in {int(port) for port in re.findall(r"127\.0\.0\.1:(\d+)", program.output)}:
