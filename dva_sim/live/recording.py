@@ -20,6 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
+from mcap.exceptions import McapError
 from typing_extensions import override
 
 from dva_sim.agents.observation import CameraFrame
@@ -407,7 +408,11 @@ class Keeper:
         self._file.close()
 
     def finish(self) -> str | None:
-        """Make the recording when all parts have ended; in one line why not, or not all of it."""
+        """Make the recording when all parts have ended; in one line why not, or not all of it.
+
+        Raises:
+            KeyboardInterrupt: its message says what is left.
+        """
         self.inlets.join()
         try:
             if self.path.exists():
@@ -417,17 +422,19 @@ class Keeper:
                 self._target.parent.mkdir(parents=True, exist_ok=True)
             lasted = make_recording(lines, self._target)
             self.path.unlink(missing_ok=True)
-        except (DvaSimError, OSError) as error:
-            why = self.problem or error
-            left = ""
-            if self.path.exists():
-                left = f"; {self.path} is left; dva-sim replay reads it"
-            return f"{self._target} was not recorded: {why}{left}"
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(self._not_recorded("stopped")) from None
+        except (DvaSimError, McapError, MemoryError, OSError) as error:
+            return self._not_recorded(self.problem or str(error) or "out of memory")
         finally:
             self._file.close()
         if self.problem is None:
             return None
         return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
+
+    def _not_recorded(self, why: str) -> str:
+        left = f"; {self.path} is left; dva-sim replay reads it" if self.path.exists() else ""
+        return f"{self._target} was not recorded: {why}{left}"
 
 
 class RunKeeping:
