@@ -142,7 +142,8 @@ class AuditLog:
             if is_new:
                 self._file.executescript(_TABLES)
         except sqlite3.Error as error:
-            raise ConfigError(f"cannot be used as an audit log: {error}", path) from None
+            remedy = "mend that or give another file, then run the command again"
+            raise ConfigError(f"cannot be used as an audit log: {error}; {remedy}", path) from None
 
     def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
         """Add rows, all or none; when this returns they are on the disk.

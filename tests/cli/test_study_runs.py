@@ -1,10 +1,10 @@
 """Messages before, during and after a run: plans, progress, and how to resume."""
 
-import sys
 import time
 from types import SimpleNamespace
 
 import pytest
+from helpers.processes.command_line import ended
 from helpers.studies import small_study as kit
 from helpers.wording import unnamed
 
@@ -148,19 +148,16 @@ def test_a_probe_spreads_over_the_design():
     assert min(abs(a - b) for a in first for b in first if a != b) >= 10
 
 
-def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, capsys):
+def test_what_is_stopped_says_in_a_line_that_the_same_command_goes_on(tmp_path, monkeypatch):
     study = kit.write_study(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["dva-sim", "run", "my study.yaml", "--set", "seed=3"])
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(StudySession, "run", stop)
-    code = study_runs.run(RunOptions(study, tmp_path / "out", jobs=1))
-    assert code == 130
-    *_, what, how = capsys.readouterr().out.splitlines()
-    assert unnamed(what, "0 of 42") == []
-    assert unnamed(how, "dva-sim run 'my study.yaml'", "--set seed=3") == []
+    code, _, error = ended("run", study, "-o", tmp_path / "out", "-j", "1", "--quiet")
+    assert (code, error.count("\n")) == (130, 1)
+    assert unnamed(error, "0 of 42", "run the same command again") == []
 
 
 def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, monkeypatch):

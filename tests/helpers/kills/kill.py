@@ -252,7 +252,7 @@ def _wrong_end(
     elif kill.deed.startswith("KILL") and is_main:
         codes = {-signal.SIGKILL}
     elif kill.deed.startswith(("TERM", "INT")) and is_main:
-        codes = {130 if kill.moment.event == AT_END else subject.asked}
+        codes = {subject.asked if kill.moment.event == SAYS else 130}
     elif kill.deed in ("KILL", "TERM"):
         codes = {subject.worker}
     else:
