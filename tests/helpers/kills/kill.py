@@ -109,6 +109,7 @@ DEEDS: dict[str, Callable[[Victim], object]] = {
     "INT": sends(signal.SIGINT),
     "TERM": sends(signal.SIGTERM),
     "KILL": sends(signal.SIGKILL),
+    "KILL, replaced": sends(signal.SIGKILL),
     "STOP": waits,
     "no memory": takes_memory,
     "full disk": fills_disk,
@@ -247,7 +248,7 @@ def _wrong_end(
     kill: Kill, subject: Subject, is_main: bool, code: int, complained: list[str]
 ) -> Iterator[str]:
     """Look at the exit code, and at the one line that says what to do."""
-    if kill.deed in ("STOP", "clock back", "clock forth"):
+    if kill.deed in ("KILL, replaced", "STOP", "clock back", "clock forth"):
         codes = {0}
     elif kill.deed.startswith("KILL") and is_main:
         codes = {-signal.SIGKILL}

@@ -79,8 +79,9 @@ def rows() -> Iterator[tuple[str, Moment, str]]:
     for part, deed in product(PARTS, ("KILL", "STOP", "no memory")):
         yield "live", Moment(part, SAYS, DRIVES), deed
         yield "live", Moment(part, "import", "dva_sim.simulation.full.stage"), deed
-    for part, deed in product(("console.web", "pages.pictures"), ("KILL", "STOP")):
+    for part, deed in (("console.web", "KILL"), ("pages.pictures", "KILL, replaced")):
         yield "console", Moment(part, SAYS, "Console: "), deed
+        yield "console", Moment(part, SAYS, "Console: "), "STOP"
     for deed in ("KILL of main", "TERM of main", "KILL", "full disk"):
         yield "demo", FILM, deed
     yield "demo", Moment(MAIN, "os.rename", "runs.parquet", done=0), "KILL"
