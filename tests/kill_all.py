@@ -9,11 +9,12 @@ import argparse
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from helpers.kills.kill import MOUNTS, NAMESPACE, troubles
+from helpers.kills.kill import MOUNTS, NAMESPACE, Kill, troubles
 from helpers.kills.table import KILLS
 
 INSIDE = "DVA_SIM_MOUNTS"
@@ -43,15 +44,14 @@ def main() -> int:
             here.mkdir()
             found = tried(kill, here, quiet)
             wrong += bool(found)
-            print(
-                "\n          ".join([f"{'WRONG' if found else 'ok':8}  {kill}", *found]), flush=True
-            )
+            lines = [f"{'WRONG' if found else 'ok':8}  {kill}", *found]
+            print("\n          ".join(lines), flush=True)
             shutil.rmtree(here, ignore_errors=True)
     print(f"{len(chosen)} kills, {wrong} wrong")
     return int(wrong > 0 or not chosen)
 
 
-def tried(kill, folder: Path, quiet: Path) -> list[str]:
+def tried(kill: Kill, folder: Path, quiet: Path) -> list[str]:
     try:
         return troubles(kill, folder, quiet)
     except Exception as error:
@@ -61,7 +61,9 @@ def tried(kill, folder: Path, quiet: Path) -> list[str]:
 def mounts_are_allowed() -> bool:
     if shutil.which(NAMESPACE[0]) is None:
         return False
-    return not os.spawnvp(os.P_WAIT, NAMESPACE[0], [*NAMESPACE, "true"])
+    with tempfile.TemporaryDirectory() as folder:
+        words = [*NAMESPACE, "mount", "-t", "tmpfs", "tmpfs", folder]
+        return subprocess.run(words, capture_output=True, check=False).returncode == 0
 
 
 def left_out(deed: str) -> str:
