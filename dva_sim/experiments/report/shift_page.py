@@ -186,7 +186,7 @@ def _notes(shifts: Shifts) -> list[str]:
         twins=_twins(shifts),
         follow=f"{shifts.follow:g} s",
         contained=[_contained(shifts, *each) for each in titles] if has_contained else [],
-        progress=[_progress(shifts, *each) for each in titles] if shifts.target else [],
+        progress=[p for each in titles if shifts.target and (p := _progress(shifts, *each))],
         is_oracle=shifts.target == BEST,
         bound=BOUND,
         is_by_load=shifts.loads[0] is not None,
@@ -198,7 +198,7 @@ def _quickest(shifts: Shifts, stop: int) -> tuple[str, float, list[str]]:
     """Return the policy of the least mean response at a load, that response, and its equals."""
     response = shifts.means("response_mean_s")
     candidates = [i for i, p in enumerate(shifts.policies) if p != BEST]
-    best = min(candidates, key=lambda i: response[i, stop])
+    best = min(candidates, key=lambda i: np.nan_to_num(response[i, stop], nan=np.inf))
     bands = shifts.against("response_mean_s", shifts.policies[best])
     low = bands.low.reshape(response.shape)[:, stop]
     equal = [shifts.policies[i] for i in candidates if i != best and not low[i] > 0]
@@ -224,8 +224,13 @@ def _contained(shifts: Shifts, stop: int, title: str) -> str:
 
 
 def _progress(shifts: Shifts, stop: int, title: str) -> str:
-    """Return `89 % at load 0.31 (min_eta, 24 to 154 %)`: the best policy's share of the way."""
+    """Return `89 % at load 0.31 (min_eta, 24 to 154 %)`: the best policy's share of the way.
+
+    Nothing where no policy has a share: all shifts of one that it is measured by have failed.
+    """
     bands = shifts.progress(stop)
+    if np.isnan(bands.mean).all():
+        return ""
     best = int(np.nanargmax(bands.mean))
     low, high = (100 * float(edge[best]) for edge in (bands.low, bands.high))
     name = shifts.travellers[best]

@@ -2,12 +2,16 @@ import re
 
 import numpy as np
 import pytest
+from helpers.kills import subjects
 from helpers.studies import synthetic_results
 from helpers.studies.report_text import blank_pictures, words
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.shift_effects import pooled
+from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.study.loading import load_study
 
 pytestmark = pytest.mark.system
 
@@ -43,6 +47,21 @@ def test_conditions_and_method_are_those_of_shifts(report):
 def test_every_cell_of_policy_and_rate_has_its_row(report):
     rows = re.findall(r"<tr.*?</tr>", report.read_text(encoding="utf-8"))
     assert len([row for row in rows if row.count("<td") > 10]) == 3 * 2
+
+
+def test_a_policy_all_of_whose_runs_failed_leaves_a_report_of_the_others(tmp_path):
+    def episode(job):
+        if job.levels["dispatch.policy"] == "random":
+            raise MemoryError
+        return run_job(job)
+
+    subjects.study(tmp_path)
+    study = load_study(tmp_path / "study.yaml")
+    out = run_study(study, tmp_path / "out", jobs=1, episode=episode)
+    with blank_pictures():
+        text = words(write_report(out))
+    assert unnamed(text, "Quickest on the mean: nearest_idle", "no run") == []
+    assert "Of the way" not in text
 
 
 def test_a_percentile_that_too_few_events_reach_is_infinite():
