@@ -189,8 +189,10 @@ def _troubles(
         yield from wrong_recording(programs, program, subject, said)
         return
     expected = undisturbed(kill.subject, quiet)
-    if code == 0 and subject.product(folder) != expected:
-        yield f"differs although it is done: {_different(subject.product(folder), expected)}"
+    if code == 0:
+        if (made := subject.product(folder)) != expected:
+            yield f"differs although it is done: {_different(made, expected)}"
+        return
     again = programs.start(*subject.words)
     if again.ends() or any(line.startswith("error") for line in again.complained):
         yield f"again it ended with {again.process.returncode}: {again.complained}"
