@@ -167,18 +167,15 @@ def _troubles(
     kill: Kill, subject: Subject, programs: Programs, folder: Path, quiet: Path
 ) -> Iterator[str]:
     program = programs.start(*subject.words, **_environment(kill, folder))
-    if kill.deed != "disk of 1 MB":
-        if (process := _reached(kill.moment, subject, programs, program)) is None:
-            yield f"ended before that: {program.output} {program.complained}"
-            return
-        said = program.output
-        victim = program.process.pid if "main" in kill.deed else process
-        is_main = victim == program.process.pid
-        DEEDS[kill.deed.removesuffix(" of main")](Victim(victim, folder / OUT))
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGCONT)
-    else:
-        is_main, said = True, ""
+    if (process := _reached(kill.moment, subject, programs, program)) is None:
+        yield f"ended before that: {program.output} {program.complained}"
+        return
+    said = program.output
+    victim = program.process.pid if "main" in kill.deed else process
+    is_main = victim == program.process.pid
+    DEEDS[kill.deed.removesuffix(" of main")](Victim(victim, folder / OUT))
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGCONT)
     if subject.ready and kill.deed not in ENDS and kill.moment.event != AT_END:
         _ask_to_end(program, subject)
     code = program.ends()
