@@ -25,7 +25,7 @@ DISK = "size=64m"
 SPARE_MB = 1  # more memory than it has at the moment
 SAYS = "says"
 AT_END = "os.rename"  # of a recording
-ADVICE = re.compile(r"\bagain\b|dva-sim (replay|report)|has ended by itself")
+ADVICE = re.compile(r"\bagain\b|same command|dva-sim (replay|report)|has ended by itself")
 PROGRESS = re.compile(r"warning: |\d+ storms, |$")
 
 
@@ -91,6 +91,11 @@ def fills_disk(victim: Victim) -> None:
             pass
 
 
+def fills_most(victim: Victim) -> None:
+    """Leave room for the journal and the tables, and for a part of the figures."""
+    (victim.out / "ballast").write_bytes(bytes(830_000))
+
+
 def forbids_writing(victim: Victim) -> None:
     """Put the folder, read-only, over itself; who has a file open may go on writing to that."""
     mount("--bind", victim.out, victim.out)
@@ -113,7 +118,7 @@ DEEDS: dict[str, Callable[[Victim], object]] = {
     "STOP": waits,
     "no memory": takes_memory,
     "full disk": fills_disk,
-    "disk of 1 MB": lambda _: None,
+    "disk of 1 MB": fills_most,
     "read-only": forbids_writing,
     "clock back": sets_clock(-86_400),
     "clock forth": sets_clock(86_400),

@@ -29,7 +29,7 @@ OF_WORKER = (
 )
 OF_STORMS = Moment(MAIN, "open", "storms.jsonl"), Moment(MAIN, "open", "storms.jsonl", 2)
 STORM = Moment(WORKER, "tempfile.mkdtemp", "dva-storm-")
-FILM = Moment(WORKER, "open", ".one-drive.gif")
+FILM = Moment(WORKER, "open", "one-drive.")
 DRIVES = "mode Teleoperation"
 PARTS = '"part": "world"', '"part": "dva"', '"part": "operator"'
 OF_LIVE = Moment(MAIN, SAYS, DRIVES), Moment(MAIN, "os.rename", "run.mcap")
