@@ -6,7 +6,8 @@ import pytest
 from helpers.studies.small_study import study_in
 
 from dva_sim.experiments.execution import scheduling
-from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
+from dva_sim.experiments.execution.checkpoint import Checkpoint, NotBegun, RunOutcome
+from dva_sim.experiments.execution.dry_run import dry_run
 from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study import cell_grid
 from dva_sim.kernel.errors import DvaSimError
@@ -23,6 +24,15 @@ def test_a_run_kept_twice_is_kept_once_and_as_it_was_first(tmp_path):
         assert one.done() == {("abc", 1), ("abc", 2)}
         assert one.tables(("abc", 1)) == {"runs": []}
         assert two.costs() == {("abc", 1): 0.5, ("abc", 2): 0.5}
+
+
+def test_a_journal_that_was_killed_as_it_was_created_is_begun_anew(tmp_path):
+    (tmp_path / JOURNAL).touch()
+    with pytest.raises(NotBegun, match="run the study again"):
+        Checkpoint(tmp_path, "me", must_exist=True)
+    assert dry_run(study_in(tmp_path), tmp_path).done == 0
+    with Checkpoint(tmp_path, "me") as journal:
+        assert journal.done() == set()
 
 
 def test_floats_come_back_to_the_last_bit(tmp_path):
