@@ -93,7 +93,7 @@ def test_workers_of_a_cluster_make_a_load_and_its_figures_but_those_of_two_clock
         dask.add_worker()
         (figures,) = json.loads(call("load", *options, *scheduler, "--json").stdout)
     assert (figures["joined"], figures["lost"], figures["broke"]) == (20, 0, "")
-    assert figures["messages_per_s"] > 40
+    assert figures["messages_per_s"] > 20
     assert figures["orders_p50_s"] is None
 
 
