@@ -33,7 +33,7 @@ class DvaWatch:
     silent: bool = False
 
     def beat(self, now: float, number: int) -> bool:
-        """Note a heartbeat; return True if it is numbered below the last: the DVA restarted."""
+        """Note a heartbeat; return True if its number is below the last: the DVA has restarted."""
         is_restarted = number < self.number
         self.heard = now
         self.beats = True

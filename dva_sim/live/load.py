@@ -207,7 +207,7 @@ def run_load(options: LoadOptions) -> Iterator[LoadFigures]:
     """
     check(options)
     devices = options.devices
-    _make_keys(options, devices)  # first: who starts with a key is known at once
+    _make_keys(options, devices)  # before the DVA reads them
     with _dva(options) as (address, dva):
         while True:
             figures = _step(options, devices, address, dva)
@@ -267,7 +267,7 @@ def _listens(address: str) -> bool | None:
 
 
 def _make_keys(options: LoadOptions, devices: int) -> None:
-    """Make the keys that are missing, that of a DVA which is started here among them."""
+    """Make the missing keys of the devices, and of the DVA if it is started here."""
     if options.keys is not None:
         shares = _shares(options, devices, "")
         crew = [(kind, ns) for share in shares for kind, ns in share.numbers().items()]

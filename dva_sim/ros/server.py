@@ -238,7 +238,7 @@ class RosbridgeServer:
             peer.offer(topic, self._map)
 
     def changed(self) -> None:
-        """See `PeerHost`: subscribe to the topics of each robot that any client wants."""
+        """See `PeerHost`: subscribe to the topics of robots that clients asked for."""
         topics = {
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }

@@ -231,7 +231,7 @@ class TriedDrive:
         self.network.publish(self.node, command_topic(self.robot), data, len(data))
 
     def newest(self, command: Any) -> Any:
-        """See `Line`: return the command itself, which is what this app keeps."""
+        """See `Line`: return the command itself."""
         return command
 
     def supersede(self, command: Any) -> None:

@@ -1,4 +1,4 @@
-"""One story leads to the same rows beside its run, attached, at a foreign DVA, and recorded."""
+"""One story shows the same rows in an own run, attached, at a foreign DVA, and in a recording."""
 
 from collections.abc import Callable, Iterator
 from copy import deepcopy
@@ -85,7 +85,7 @@ class Carrier:
         return {one["i"]: one["label"] for one in things if one["kind"] in ("robot", "guard")}
 
     def rows(self) -> dict[str, Rows]:
-        """All rows of now, by what they are about."""
+        """Return the present rows, by the thing that each describes."""
         labels = self.labels()
         robots = {labels[row["i"]]: {**row, "i": None} for row in self.newest("rows")["robots"]}
         for row in robots.values():
@@ -132,7 +132,7 @@ def story(page: PhonePage) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def carriers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Carrier]]:
-    """All carriers at the end of the story, each with its rows at each moment."""
+    """The four carriers after the story, with their rows at each moment."""
     folder = tmp_path_factory.mktemp("carriers")
     with pytest.MonkeyPatch.context() as patch:
         page = PhonePage(

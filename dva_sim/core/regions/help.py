@@ -18,7 +18,7 @@ from dva_sim.protocol import messages as m
 
 ASK_AFTER: Final = 5.0  # design: an event for which nobody was free for so long needs help [s]
 KNOWN_FOR: Final = 5.0  # design: a DVA is asked that has said what it serves since then [s]
-ORPHANED_AFTER: Final = 10.0  # design: who was started again asks anew within this time [s]
+ORPHANED_AFTER: Final = 10.0  # design: time in which a restarted DVA can ask for help again [s]
 SEVERITY: Final = 0.5  # of a copy: an order does not say it
 _FINDINGS: Final = {State.CONFIRMED: "confirmed", State.REFUTED: "refuted"}
 
@@ -52,7 +52,7 @@ class MutualHelp:
     told: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, list[Send]] = field(default_factory=dict)
     _news: dict[int, list[str]] = field(default_factory=dict)
-    _forgotten: dict[int, float] = field(default_factory=dict)  # since when, by copy [s]
+    _forgotten: dict[int, float] = field(default_factory=dict)  # restart of the asker, by copy [s]
 
     # --- asked for -----------------------------------------------------------------------
 
@@ -90,7 +90,7 @@ class MutualHelp:
         if order.task != "confirm" or order.device is not None:
             return DvaAnswer(m.NOT_SUPPORTED, "a DVA helps to look, by whom it chooses")
         known = next((n for n, lent in self.copies.items() if lent.number == order.event_id), None)
-        if known is not None:  # who asks may have taken the event over
+        if known is not None:  # the asker may have taken the event over
             self.copies[known] = Lent(asker, order.event_id)
             self._forgotten.pop(known, None)
         if self.copy_of(asker, order.event_id) is not None:
@@ -124,11 +124,11 @@ class MutualHelp:
         self._drop(number)
 
     def forgotten_by(self, asker: str, now: float) -> None:
-        """Note that a DVA was started again, and may not know what it has asked for."""
+        """Note that a DVA has restarted, and may not remember what it asked for."""
         self._forgotten |= {n: now for n, lent in self.copies.items() if lent.asker == asker}
 
     def adopt_orphans(self, now: float) -> None:
-        """Keep the copies that nobody has asked for again: they are passed on to their DVA."""
+        """Make events of the copies for which nobody has asked again; they go to their own DVA."""
         for number in [n for n, at in self._forgotten.items() if now - at > ORPHANED_AFTER]:
             self.adopt(number)
 

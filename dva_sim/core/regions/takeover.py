@@ -72,12 +72,13 @@ class Deputy:
         return DvaAnswer()
 
     def return_copies(self, peer: str, known: Mapping[str, int], now: float) -> list[Send]:
-        """Return the copies that a DVA needs which was started again, before it was replaced.
+        """Return the copies that a restarted DVA needs if no other has replaced it.
 
         Args:
             peer: The DVA.
-            known: Epochs by which it serves regions, as it knows. A region that was given back
-                to it has a higher one, which it is told first: copies of that are not its own.
+            known: Epoch of each region that it believes it serves. After a region was given
+                back to it, the true epoch is higher: it gets that first, in a `GiveBack`, as it
+                would take copies of a higher epoch for another DVA's.
             now: Time [s].
         """
         sends: list[Send] = []
@@ -134,7 +135,7 @@ class Deputy:
             entry.free_from = now + COME_WITHIN
 
     def let_go(self, device: str, number: int) -> None:
-        """Note that a device has ended its work at a copied event, whose DVA never heard of it."""
+        """Note that a device has ended its work at a copied event, unheard by the event's DVA."""
         for copies in self.copies.values():
             copy = copies.get(number)
             if copy is not None and device in self._sent(copy.status):
@@ -201,7 +202,7 @@ class Deputy:
         return [device for device in every if device is not None]
 
     def _is_there(self, device: str) -> bool:
-        """Return True for a device that goes on here; a DVA that helps has to be asked again."""
+        """Return True for a device that continues here; a helping DVA has to be asked again."""
         entry = self.orders.registry.entries.get(device)
         return entry is not None and not entry.silent and entry.kind != PEER
 

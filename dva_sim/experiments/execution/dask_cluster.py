@@ -94,10 +94,10 @@ class DaskCluster(Workers):
         return max(1, len(self._workers() or ()))
 
     def wait_for(self, workers: int) -> None:
-        """Wait until there are so many workers.
+        """Wait until the cluster has this number of workers.
 
         Raises:
-            ConfigError: there are fewer, and no more have come for some seconds.
+            ConfigError: it has fewer after ten seconds.
         """
         try:
             self._client.wait_for_workers(workers, timeout=_CONNECT_S)

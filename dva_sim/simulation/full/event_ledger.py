@@ -27,7 +27,7 @@ LOST_BY_RESTART = 1.0  # a killed DVA continues from the time of its last write 
 INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
-RETURNED_WITHIN = 8.0  # time after contact until a restarted DVA has its events back [s]
+RETURNED_WITHIN = 8.0  # a restarted DVA has its events back this long after contact [s]
 SIMULTANEOUS_S = 20.0  # deaths of DVAs within this time are simultaneous: copies take a while [s]
 HEARD_LATE = 25.0  # longest delay of a reported position over a bad link [s]
 STIRRED = 0.25  # least distance that counts as a move: half of the DVA's own limit [m]
@@ -205,7 +205,7 @@ class EventLedger:
                 if state not in ("departed", "arrived"):
                     self._ends(self._word(number), source)
                     self._word(number).ended.add(source)
-            case m.Replicate(event=event):  # of a DVA that may die before its book is seen
+            case m.Replicate(event=event):  # its DVA may die before its book is seen
                 self._numbers[event.event_id] = None
             case m.Registration():
                 self._registered[source] = now
@@ -345,7 +345,7 @@ class EventLedger:
             self._adopt(now)
             last = -math.inf
         judged = self._taken if len(self._books) < 2 else self._unjudged
-        self._unjudged = self._taken  # by the next check, the books of all DVAs are as new
+        self._unjudged = self._taken  # of several DVAs: the other books are older than the report
         self._taken = []
         for report in judged:
             yield from self._listed(report)
@@ -454,7 +454,7 @@ class EventLedger:
         self._promised[event.number] = 0.0
         word.ordered.update((device, goes or device) for device, goes in sent.items() if device)
         word.went.update(word.ordered.items())
-        for book in self._books:  # who has accepted it at another DVA, from which it was taken over
+        for book in self._books:  # an order that was accepted at the DVA before
             word.taken |= book._word(event.number).taken & word.ordered.keys()
         conclusions = FOUND.intersection((*event.times, event.state.value))
         return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))

@@ -159,7 +159,7 @@ class RegionalDvaAgent(DvaAgent):
         return self._decide(request, message)
 
     def _decide(self, request: Request, message: m.Message) -> m.Reply | None:
-        """Answer here; a new report waits for its copy."""
+        """Answer a request here; the reply to a new report waits for the deputy's copy."""
         reply = super()._on_request(message)
         is_new = isinstance(message.body, m.EventReport) and message.body.event_id is None
         if not is_new or reply is None or reply.code != m.OK:

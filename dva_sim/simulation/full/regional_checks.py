@@ -22,7 +22,7 @@ OBEYS_WITHIN: Final = 5.0  # delay allowed between an order and its first effect
 HEALS_WITHIN: Final = 30.0  # time in which two DVAs that hear each other have to agree [s]
 HEARD_WITHIN: Final = 6.0  # a DVA heard within this time counts as reachable now [s]
 SHOWN_WITHIN: Final = 5.0  # a DVA whose table was not seen for this long is dead [s]
-PASSED_WITHIN: Final = 0.9  # time in which what a DVA has taken from another is in its table [s]
+PASSED_WITHIN: Final = 0.9  # an event from another DVA is in the table within this time [s]
 GOES_ON_WITHIN: Final = (
     15.0  # time after a takeover in which a dead DVA's events are open again [s]
 )
@@ -125,7 +125,7 @@ class RegionalRules:
         elif source in self.terms.dvas and isinstance(body, ORDERS):
             key = to, source, message.message_id
             order = self._ordered.get(key)
-            if order is None or order.timestamp != message.timestamp:  # others are repetitions
+            if order is None or order.timestamp != message.timestamp:  # else it is a repetition
                 self._ordered[key] = Asked(message.timestamp, self._obeys.get(to))
         for table in (self._registers, self._ordered, self._reported, self._requests):
             if len(table) > MAX_KEPT:
@@ -204,13 +204,13 @@ class RegionalRules:
             self._down[dva] = now
         if page.works:
             self._died.pop(page.dva, None)
-        else:  # with it goes what it has heard and does, until it hears and does it again
+        else:  # it forgets what it heard, and starts afresh
             self._epochs = {key: at for key, at in self._epochs.items() if key[0] != page.dva}
             self._promised_help = [p for p in self._promised_help if p[0] != page.dva]
             for key in [key for key in self._requests if page.dva in key]:
-                del self._requests[key]  # a new life gives the numbers again
-            for rule in ("S14", "S15"):
-                list(self._lasting(rule, page.dva, set(), now))
+                del self._requests[key]  # a restarted DVA uses the numbers again
+            over = {("S14", page.dva), ("S15", page.dva)}
+            self._since = {key: at for key, at in self._since.items() if key[:2] not in over}
 
     def _of_the_dead(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield promises of a dead DVA that the one which has taken over does not keep."""
@@ -250,7 +250,7 @@ class RegionalRules:
                     yield "S13", f"has let go of event {number}, which {by} does not have"
 
     def _near_elsewhere(self, page: Page, event: Event) -> Iterator[Event]:
-        """Yield the same event in books of others: it may go from one to the next."""
+        """Yield the same event in the books of other DVAs, which may pass it on in turn."""
         for other in self._pages.values():
             events = (*other.events.open.values(), *other.events.closed.values())
             same = (e for e in events if e.kind == event.kind and e.number not in other.copies)
@@ -314,7 +314,7 @@ class RegionalRules:
                 yield "S15", f"{what}, which needs that no longer"
 
     def _of_promised_help(self, page: Page, now: float) -> Iterator[Broken]:
-        """Yield help that was promised, and for which nothing is booked."""
+        """Yield promises of help for which nothing is in the book."""
         due = [p for p in self._promised_help if p[0] == page.dva and now - p[2] > PASSED_WITHIN]
         self._promised_help = [each for each in self._promised_help if each not in due]
         events = (*page.events.open.values(), *page.events.closed.values())

@@ -252,7 +252,7 @@ class Witness:
         self.heard = now
 
     def registers(self, dva: str, registration: tuple[int, str], now: float) -> None:
-        """Note a registration, unless it is sent again; those at one DVA follow each other."""
+        """Note a registration, unless it is repeated; only those at one DVA are in order."""
         registrations = self.registrations[dva]
         if registration not in registrations:
             last = registrations[-1][0] if registrations else 0

@@ -1,6 +1,7 @@
-"""One kill: a program is stopped at a moment of its progress, something is done to it, it goes on.
+"""One kill: a program is halted at a moment of its progress, disturbed, and let go on.
 
-Then nothing of it runs, one line says what to do, and done again it ends as if nothing had been.
+Afterwards no process is left, one line says what to do, and a second start ends with the same
+bytes as an undisturbed one.
 """
 
 import json
