@@ -6,7 +6,8 @@ import csv
 import io
 import math
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -18,6 +19,7 @@ from dva_sim.options.runs import LoadOptions
 
 if TYPE_CHECKING:
     from dva_sim.live.load import LoadFigures
+    from dva_sim.live.load_devices import LoadShare
 
 DECIMALS = 6  # decimals of a figure
 
@@ -42,7 +44,8 @@ def load(options: LoadOptions, quiet: Quiet = False, as_json: Json = False) -> N
             raise ConfigError(f"{out} should end in .csv")
         refuse_to_replace([out], options.overwrite)
     steps = []
-    for figures in run_load(options):
+    make = None if options.scheduler is None else partial(_make_on_cluster, options.scheduler)
+    for figures in run_load(options, make):
         steps.append(figures)
         if not (quiet or as_json):
             for line in lines(figures):
@@ -53,6 +56,20 @@ def load(options: LoadOptions, quiet: Quiet = False, as_json: Json = False) -> N
         print_json([asdict(figures) for figures in steps])
     if steps[-1].broke and not options.until_it_breaks:
         raise typer.Exit(ExitCode.DOES_NOT_HOLD)
+
+
+def _make_on_cluster(scheduler: str, shares: list[LoadShare]) -> list[dict[str, Any]]:
+    """Make the shares of a load on a cluster, one on each worker; return the counts of each.
+
+    Clocks of machines are apart, so no time from a report here to an order there is known.
+    """
+    from dva_sim.experiments.execution.dask_cluster import DaskCluster  # late: start-up
+    from dva_sim.live.load_devices import make  # late: start-up
+
+    with DaskCluster(scheduler) as workers, workers.executor(len(shares), make) as executor:
+        workers.wait_for(len(shares))
+        futures = [executor.submit(workers.guarded(make), share) for share in shares]
+        return [future.result() | {"ordered": []} for future in futures]
 
 
 def lines(figures: LoadFigures) -> list[str]:

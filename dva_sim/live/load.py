@@ -10,7 +10,7 @@ import subprocess
 import sys
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,9 +18,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.load_devices import LONGEST, LoadShare, make
+from dva_sim.live.load_devices import LONGEST, LoadShare
 from dva_sim.live.supervisor import free_pairs
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import create_keys
@@ -36,6 +35,7 @@ MAX_LOST: Final = 0.01  # design: share of requests lost or refused that counts 
 OF_DVA: Final = ("report", "list", "session")  # requests to the DVA; others go to robots
 PERCENTILES: Final = (50.0, 99.0, 99.9)
 Times = dict[str, list[float]]
+MakeShares = Callable[[list[LoadShare]], list[dict[str, Any]]]
 
 
 @dataclass(frozen=True)
@@ -198,8 +198,13 @@ class LoadedDva:
         return (self._here / name).read_text()
 
 
-def run_load(options: LoadOptions) -> Iterator[LoadFigures]:
+def run_load(options: LoadOptions, make_shares: MakeShares | None = None) -> Iterator[LoadFigures]:
     """Put load on a DVA; yield the figures of each step.
+
+    Args:
+        options: The load.
+        make_shares: Function that makes the shares of a step at once, and returns the counts of
+            each; default: in processes of this machine.
 
     Raises:
         ConfigError: the address is none, or there are more sessions than devices.
@@ -210,7 +215,7 @@ def run_load(options: LoadOptions) -> Iterator[LoadFigures]:
     _make_keys(options, devices)  # before the DVA reads them
     with _dva(options) as (address, dva):
         while True:
-            figures = _step(options, devices, address, dva)
+            figures = _step(options, devices, address, dva, make_shares or make_here)
             yield figures
             if not options.until_it_breaks or figures.broke:
                 return
@@ -299,18 +304,17 @@ def _shares(options: LoadOptions, devices: int, address: str) -> list[LoadShare]
     ]
 
 
-def _step(options: LoadOptions, devices: int, address: str, dva: LoadedDva) -> LoadFigures:
+def _step(
+    options: LoadOptions, devices: int, address: str, dva: LoadedDva, make_shares: MakeShares
+) -> LoadFigures:
     shares = _shares(options, devices, address)
     before = dva.used_s
-    if options.scheduler is None:
-        every = _made_here(shares)
-    else:
-        every = _made_on_cluster(options.scheduler, shares)
+    every = make_shares(shares)
     looked = dva.look(before, shares[0].settle + options.duration)
     return figures_of(options, devices, every, looked)
 
 
-def _made_here(shares: list[LoadShare]) -> list[dict[str, Any]]:
+def make_here(shares: list[LoadShare]) -> list[dict[str, Any]]:
     """Make the shares in processes of this machine; return the counts of each."""
     children = []
     pipe = subprocess.PIPE
@@ -321,20 +325,6 @@ def _made_here(shares: list[LoadShare]) -> list[dict[str, Any]]:
         return [json.loads(said(child)) for child in children]
     finally:
         end_all(children)
-
-
-def _made_on_cluster(scheduler: str, shares: list[LoadShare]) -> list[dict[str, Any]]:
-    """Make the shares on the workers of a cluster, one on each; return the counts of each.
-
-    Clocks of machines are apart, so no time from a report here to an order there is known.
-
-    Raises:
-        ConfigError: there are fewer workers than shares.
-    """
-    with DaskCluster(scheduler) as workers, workers.executor(len(shares), make) as executor:
-        workers.wait_for(len(shares))
-        futures = [executor.submit(workers.guarded(make), share) for share in shares]
-        return [future.result() | {"ordered": []} for future in futures]
 
 
 def said(child: Child) -> bytes:
