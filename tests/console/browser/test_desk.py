@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from helpers.console.changed_lines import sockets_of
 from helpers.console.console_program import started
+from helpers.console.driving_page import start, take
 from helpers.processes.patience import PATIENCE_S
 from playwright.sync_api import Page, expect
 
@@ -196,10 +197,8 @@ def test_a_person_drives_a_robot_to_the_event_and_the_event_is_theirs(both):
 def test_who_leaves_the_page_in_a_drive_ends_it_and_no_robot_counts_as_lost(both):
     page, other = both
     page.get_by_role("link", name="Drive").click()
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_role("button", name="Start", exact=True).click()
-    mode = page.get_by_role("status", name="Mode")
-    expect(mode).to_have_text("Teleoperation", timeout=1000 * PATIENCE_S)
+    take(page)
+    start(page)
     page.get_by_role("link", name="Events").click()
     other.get_by_role("link", name="Map").click()
     robots = other.get_by_role("listitem").filter(has_text="robot-1")

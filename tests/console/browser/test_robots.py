@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
+from helpers.console import driving_page
 from helpers.console.accessibility import faults
 from helpers.console.changed_lines import HOSTILE, renamed, sockets_of
 from helpers.console.console_program import started
@@ -96,12 +97,10 @@ def spokes(page: Page) -> str:
 def driving(page: Page) -> Iterator[None]:
     """Somebody drives the robot from the page for driving, in another tab."""
     page.get_by_role("link", name="Drive").click()
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_role("button", name="Start", exact=True).click()
-    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    driving_page.take(page)
+    driving_page.start(page)
     yield
-    page.get_by_role("button", name="Release control").click()
-    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+    driving_page.release(page)
 
 
 def test_the_list_leads_to_the_windows_of_each_robot(shared, console):
@@ -191,7 +190,7 @@ def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_ha
         driver.get_by_role("button", name="Take control").click()
         driver.get_by_role("button", name="Start", exact=True).click()
         expect(driver.get_by_text("does not start yet: driven by hand")).to_be_visible()
-    expect(driver.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    driving_page.start(driver)
     hand.get_by_role("button", name="Take manual control").click()
     expect(hand.get_by_text("busy: held by console-1")).to_be_visible()
     driver.get_by_role("button", name="Release control").click()

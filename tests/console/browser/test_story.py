@@ -9,6 +9,7 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+from helpers.console import driving_page
 from helpers.console.console_program import started
 from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.network.emulated_link import need_link
@@ -57,8 +58,7 @@ def test_who_drives_over_an_emulated_link_sees_what_it_takes(visit, programs):
         return start.is_enabled()
 
     assert becomes(holds)
-    start.click()
-    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    driving_page.start(page)
     page.keyboard.down("ArrowUp")
     # The first command opens a connection, which takes three round trips more.
     assert becomes(lambda: 600 <= page.evaluate(ROUND_TRIP) < 1200)
