@@ -76,7 +76,7 @@ class Clock:
         self.env.call(at if at > self._now_us else self._now_us, action, args)
 
     def every(
-        self, period: float, action: Callable[[], object], start: float | None = None
+        self, period: float, action: Callable[[], bool | None], start: float | None = None
     ) -> None:
         """Run `action()` each `period` [s] until it returns `False`; first at `start` [s]."""
         call = self.env.call

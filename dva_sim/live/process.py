@@ -126,6 +126,7 @@ def run_part(
         name: `dva`, `world` or `operator`.
         options: Scenario, addresses and other options.
         say: Callback for a report as soon as the part listens, each second, and one at the end.
+            It returns False if there was no room for the report.
         number: Number of the operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: True to end when standard input does: the parent process has gone.
@@ -225,7 +226,7 @@ def _run_part(
             beside.begin(ServedDva(part.agent, network, part.aside, tell))
         gc.freeze()  # what stays for the whole run is not looked through again and again
         reporter = _Reporter(name, number, stage, part, network)
-        clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
+        clock.every(REPORT_PERIOD, lambda: reporter.tell(say))
         serves = name == "dva" and not supervised
         usual = math.inf if serves else scenario.horizon_s
         lasts = usual if options.duration is None else options.duration
@@ -239,7 +240,7 @@ def _run_part(
                 clock.run(lasts)
             part.finish()
             clock.run(clock.now + LAST_WORDS)
-        say(reporter.report())
+        reporter.tell(say)
 
 
 def _refuse_to_be_alone(
@@ -294,8 +295,8 @@ class _Reporter:
         self._part = part
         self._network = network
 
-    def report(self) -> Report:
-        """Return the present report."""
+    def tell(self, say: Callable[[Report], object]) -> None:
+        """Report the present; a story that was not taken is told again."""
         recorder = self._stage.recorder
         part = self._part
         if isinstance(recorder, LiveRecorder):
@@ -304,7 +305,7 @@ class _Reporter:
         story = recorder.timeline
         recorder.timeline = []
         clock = self._network.clock
-        return Report(
+        report = Report(
             part=self._name,
             number=self._number,
             time=clock.now,
@@ -316,6 +317,8 @@ class _Reporter:
             dva=self._network.address(id_of("dva", self._number)) if self._name == "dva" else None,
             lateness=clock.lateness,
         )
+        if say(report) is False:
+            recorder.timeline[:0] = story
 
 
 @dataclass

@@ -38,6 +38,23 @@ def test_a_dva_that_no_device_joins_says_so_at_its_end():
     assert issubclass(NobodyThere, RunsFailed)
 
 
+def test_a_part_whose_reports_have_no_room_goes_on_and_tells_its_story_in_full(monkeypatch):
+    monkeypatch.setattr(process, "REPORT_PERIOD", 0.05)
+    monkeypatch.setattr(process, "_refuse_to_be_alone", lambda *_: None)
+    reports = []
+
+    def say(report):
+        reports.append(report)
+        return len(reports) > 2
+
+    run_part("dva", LiveOptions("drive-to-event", duration=0.2), say)
+    untaken, again, taken, later = (report.story for report in reports[:4])
+    assert untaken
+    assert again[: len(untaken)] == untaken
+    assert taken[: len(again)] == again
+    assert untaken[0] not in later
+
+
 @pytest.mark.parametrize(
     ("part", "supervised", "changes", "lasts"),
     [
