@@ -296,7 +296,7 @@ class _Reporter:
         self._network = network
 
     def tell(self, say: Callable[[Report], object]) -> None:
-        """Report the present; a story that was not taken is told again."""
+        """Report the present, and what of the story has not been taken before."""
         recorder = self._stage.recorder
         part = self._part
         if isinstance(recorder, LiveRecorder):

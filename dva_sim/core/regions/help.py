@@ -30,6 +30,11 @@ class Lent(NamedTuple):
     number: int
 
 
+def event_told(body: m.Body) -> int | None:
+    """Return the number of the event whose order a message tells something of, if it does."""
+    return body.event_id if isinstance(body, m.OrderProgress | m.EventReport) else None
+
+
 @dataclass
 class MutualHelp:
     """Help that a DVA asks for and gives.
@@ -42,6 +47,7 @@ class MutualHelp:
         lent: Devices that have worked for others and may still be away.
         told: Time at which each other DVA last said what it serves [s].
         unheard: Words about orders that have not reached another DVA, by that DVA.
+        on_the_way: Words about orders that have been sent, and not been answered yet.
     """
 
     division: Division
@@ -51,6 +57,7 @@ class MutualHelp:
     lent: set[str] = field(default_factory=set)
     told: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, list[Send]] = field(default_factory=dict)
+    on_the_way: set[Send] = field(default_factory=set)
     _news: dict[int, list[str]] = field(default_factory=dict)
     _forgotten: dict[int, float] = field(default_factory=dict)  # restart of the asker, by copy [s]
 
@@ -95,6 +102,8 @@ class MutualHelp:
             self._forgotten.pop(known, None)
         if self.copy_of(asker, order.event_id) is not None:
             return DvaAnswer()
+        if self._owes_word(asker, order.event_id):
+            return DvaAnswer(m.BUSY, "what became of the order before is on its way")
         if not self.dispatcher.situations.idle(now):
             return DvaAnswer(m.BUSY, "nobody is free here")
         orders = self.dispatcher.orders
@@ -105,6 +114,14 @@ class MutualHelp:
         self.copies[event.number] = Lent(asker, order.event_id)
         orders.counters["help given"] += 1
         return DvaAnswer(sends=self.dispatcher.decide(now))
+
+    def _owes_word(self, asker: str, number: int) -> bool:
+        """Return True if what became of an earlier order of the same event is not known yet.
+
+        Word of it would end a new order, which nobody would then call off.
+        """
+        untold = self.on_the_way.union(self.unheard.get(asker, ()))
+        return any(s.to == asker and event_told(s.body) == number for s in untold)
 
     def copy_of(self, peer: str, number: int) -> Event | None:
         """Return the open copy of an event of another DVA."""

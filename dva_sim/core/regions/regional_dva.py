@@ -11,7 +11,7 @@ from dva_sim.core.event_status import status_of
 from dva_sim.core.events import Event, State, apart
 from dva_sim.core.regions.borders import Borders
 from dva_sim.core.regions.division import FIRST_EPOCH, Claim, Division
-from dva_sim.core.regions.help import MutualHelp
+from dva_sim.core.regions.help import MutualHelp, event_told
 from dva_sim.core.regions.leases import Leases
 from dva_sim.core.regions.returns import Returns
 from dva_sim.core.regions.strays import Strays
@@ -113,11 +113,17 @@ class RegionalDva(Dva):
             return self.deputy.return_copies(send.to, {region: claim.epoch}, now)
         if isinstance(send.body, m.EventReport) and send.body.event_id is None:
             return self._with_revocations(self.strays.taken(send, now))
+        self.help.on_the_way.discard(send)
+        if isinstance(send.body, m.Order) and send.to in self.division.peers:
+            number = send.body.event_id
+            if self.orders.engaged.find(send.to, number) is None:  # it is over meanwhile
+                return self._with_revocations([Send(send.to, m.OrderProgress(number, "done"))])
         return super().delivered(send, now, content)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """Handle a message that was not taken; others than orders are said again later."""
-        if isinstance(send.body, m.OrderProgress) and send.to in self.division.peers:
+        if self._is_word(send):
+            self.help.on_the_way.discard(send)
             self.help.unheard.setdefault(send.to, []).append(send)
         is_later = isinstance(send.body, m.HandOver | m.EventReport)
         return [] if is_later else super().undelivered(send, now)
@@ -282,4 +288,10 @@ class RegionalDva(Dva):
 
     def _with_revocations(self, sends: Iterable[Send]) -> list[Send]:
         """Return the messages as `Dva` does, and the news for DVAs that asked for help."""
-        return [*super()._with_revocations(sends), *self.help.news()]
+        sends = [*super()._with_revocations(sends), *self.help.news()]
+        self.help.on_the_way.update(filter(self._is_word, sends))
+        return sends
+
+    def _is_word(self, send: Send) -> bool:
+        """Return True for a message that tells another DVA of an order."""
+        return send.to in self.division.peers and event_told(send.body) is not None

@@ -339,6 +339,7 @@ class DvaAgent:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
         # What arrived unreadable was not heard at all.
         is_end = isinstance(send.body, m.PermissionRevocation | m.OrderProgress)
+        is_end = is_end or (isinstance(send.body, m.EventReport) and send.body.event_id is not None)
         if reply.code == m.OK or (is_end and reply.code != m.BAD_MESSAGE):
             now = self.device.clock.now
             self._carry_out(self.core.delivered(send, now, reply.content))

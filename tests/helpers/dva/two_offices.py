@@ -8,6 +8,7 @@ from helpers.dva.dispatch_office import DEGREE_EAST, HERE, crow, east
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import MinEta
 from dva_sim.core.regions.division import Division
+from dva_sim.core.regions.help import event_told
 from dva_sim.core.regions.regional_dva import RegionalDva
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.protocol import messages as m
@@ -77,7 +78,7 @@ class Street:
             reaches = send.to not in self.cores or not (self.parted or send.to in self.dead)
             if send.to in self.cores and reaches:
                 reply = self.say(send.to, dva, send.body)
-                reaches = reply.code == m.OK
+                reaches = reply.code == m.OK or event_told(send.body) is not None
             core = self.cores[dva]
             again = core.delivered if reaches else core.undelivered
             self.deliver(dva, again(send, self.now))
