@@ -56,8 +56,9 @@ class Deputy:
         if claim is None:
             return DvaAnswer(m.NOT_SUPPORTED, f"no region {body.region!r} is known here")
         if claim == Claim(body.epoch, self.division.own):  # it returns what this DVA has forgotten
-            self.copies.setdefault(body.region, {})[body.event.event_id] = Copy(body.event, now)
-            self.taken_over[body.region] = now
+            known = self.copies.setdefault(body.region, {})
+            known.setdefault(body.event.event_id, Copy(body.event, now))  # it may return it twice
+            self.taken_over.setdefault(body.region, now)
             return DvaAnswer()
         self.division.learn(body.region, Claim(body.epoch, peer))
         if self.division.claims[body.region] != Claim(body.epoch, peer):
@@ -192,7 +193,7 @@ class Deputy:
                 sent = self._sent(copy.status)
                 are_back = all(self._is_there(device) for device in sent)
                 are_back = are_back and copy.status.responder not in self.orders.engaged
-                if are_back or now - since >= COME_WITHIN:
+                if are_back or now - max(since, copy.told) >= COME_WITHIN:
                     del copies[number]
                     self._go_on(copy, are_back, now)
 

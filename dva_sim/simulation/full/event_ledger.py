@@ -27,7 +27,8 @@ LOST_BY_RESTART = 1.0  # a killed DVA continues from the time of its last write 
 INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
-RETURNED_WITHIN = 8.0  # a restarted DVA has its events back this long after contact [s]
+MISSED_WITHIN = 6.0  # DVAs that hear nothing of each other for so long are apart [s]
+RETURNED_WITHIN = 12.0  # after contact: what its deputy sends first, then 4 s for responders [s]
 SIMULTANEOUS_S = 20.0  # deaths of DVAs within this time are simultaneous: copies take a while [s]
 HEARD_LATE = 25.0  # longest delay of a reported position over a bad link [s]
 STIRRED = 0.25  # least distance that counts as a move: half of the DVA's own limit [m]
@@ -330,6 +331,9 @@ class EventLedger:
             self._let_no_time_pass(passed)
             self._down_at = self._down_at if self._was_down else now
             self._was_down = True
+            if len(self._books) > 1:  # S13 judges what it has taken just before, and was copied
+                self._taken.clear()
+                self._unjudged.clear()
             return
         if self._was_down:
             self._was_down = False
@@ -368,9 +372,9 @@ class EventLedger:
             yield "S6", f"event {number} is open and closed"
         gone = self._open.keys() - events.open.keys() - events.closed.keys()
         gone = {n for n in gone if not self._may_be_gone(n, *self._open[n])}
-        if any(not self._meets(book) for book in self._books):
-            self._alone_at = now
         returns = now - max(self._back_at, self._alone_at) < RETURNED_WITHIN
+        if returns and any(not self._meets(book) for book in self._books):
+            self._alone_at = now
         later = {number: self._open[number] for number in gone if returns}
         for number in gone - later.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
@@ -483,9 +487,10 @@ class EventLedger:
         return any(e.kind == kind and apart(e.position, place) < near for e in all_events)
 
     def _meets(self, book: EventLedger) -> bool:
-        """Return True if this DVA and another have heard each other since this one is back."""
+        """Return True if this DVA hears another, and is heard, since this one is back."""
         heard = self._heard.get(book._dva, -math.inf), book._heard.get(self._dva, -math.inf)
-        return book is self or book._was_down or min(heard) >= self._back_at
+        is_lately = min(heard) >= max(self._back_at, self._now - MISSED_WITHIN)
+        return book is self or book._was_down or is_lately
 
     def _worked_since(self, time: float) -> bool:
         return not self._was_down and self._back_at < time

@@ -141,14 +141,17 @@ def test_a_robot_that_is_driven_under_a_session_of_the_dead_is_nobody_elses():
 def test_a_dva_that_was_started_again_gets_its_events_back_with_their_ages():
     street = Street()
     street.tick(2)
-    copied(street, "pending")
+    copied(street, "assigned", responder=GUARD)
     street.tick(3)
     street.cores[WEST] = street.new_core(WEST, life=1)
     street.register(WEST, EAST, "DVA")
     street.number = 0
     street.register(EAST, WEST, "DVA")
-    assert street.told(WEST, m.Replicate)[0].event.age == 23.0
-    street.tick(5)
+    (returned,) = street.told(WEST, m.Replicate)
+    assert returned.event.age == 23.0
+    street.tick(2)
+    street.say(WEST, EAST, returned)  # the reply to the first was lost
+    street.tick(3)
     event = street.cores[WEST].events.open[7]
     assert event.times["detected"] == pytest.approx(2.0 - 20.0)
 
