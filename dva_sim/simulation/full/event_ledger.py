@@ -458,8 +458,9 @@ class EventLedger:
         self._promised[event.number] = 0.0
         word.ordered.update((device, goes or device) for device, goes in sent.items() if device)
         word.went.update(word.ordered.items())
-        for book in self._books:  # an order that was accepted at the DVA before
-            word.taken |= book._word(event.number).taken & word.ordered.keys()
+        for book in self._books:  # orders that were accepted at the DVA before
+            before = book._word(event.number)  # of an end there the copy may know nothing
+            word.taken |= (before.taken | before.ended) & word.ordered.keys()
         conclusions = FOUND.intersection((*event.times, event.state.value))
         return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))
 
