@@ -31,6 +31,7 @@ from dva_sim.console.wire.arguments import (
     FindingAsked,
     MissionAsked,
     OfDevice,
+    OfRegion,
     OfSome,
     ReportAsked,
     RoomName,
@@ -183,6 +184,20 @@ class DecisionActions:
             revoke_permission(robot, label, self._at(robot, agent).ask, on_result)
 
         self._rooms.decide(client, _role(line), on_result, revoke)
+
+    @does("give_back")
+    def _give_back(self, client: str, line: OfRegion, on_result: OnResult) -> None:
+        """Have a region given back by the DVA that serves it."""
+        region = line["region"]
+        regions = self._system.system.regions
+        if region not in regions.own:
+            raise Refused(f"there is no region {region!r}")
+
+        def ask(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            agent = self._rooms.listener.at(regions.server_of(region), agent)
+            self._ask(m.GiveBack(region), f"{region} is being given back", agent, on_result)
+
+        self._rooms.decide(client, _role(line), on_result, ask)
 
     @does("release_emergency")
     def _release(self, client: str, line: OfSome, on_result: OnResult) -> None:

@@ -33,15 +33,19 @@ class ServedRegions:
         there = {d for d in self.labels if now - self.heard.get(d, (0.0,))[0] <= ALARM_AFTER}
         return [self._row(region, there) for region in self.own]
 
-    def _row(self, region: str, there: set[str]) -> RegionShown:
-        own = self.own[region]
+    def server_of(self, region: str) -> str:
+        """Return the id of the DVA with the newest claim to a region."""
         claims = (
             (each.epoch, dva)
             for dva, (_, status) in self.heard.items()
             for each in status.regions
             if each.region == region
         )
-        _, dva = max(claims, default=(1, own))
+        return max(claims, default=(1, self.own[region]))[1]
+
+    def _row(self, region: str, there: set[str]) -> RegionShown:
+        own = self.own[region]
+        dva = self.server_of(region)
         how = "is back, and may get it back" if own in there else "is silent"
         state: RegionState = "served" if dva == own else "deputy"
         state = state if dva in there else "dead"
@@ -50,7 +54,13 @@ class ServedRegions:
             "deputy": f"served by {self.labels[dva]}, its deputy, as {self.labels[own]} {how}",
             "dead": f"{self.labels[dva]} is silent: nobody serves it",
         }
-        return {"name": region, "state": state, "text": text[state]}
+        is_returnable = state == "deputy" and own in there
+        return {
+            "name": region,
+            "state": state,
+            "text": text[state],
+            "is_returnable": is_returnable,
+        }
 
 
 def regions_of(scenario: Scenario) -> ServedRegions:

@@ -37,6 +37,7 @@ from dva_sim.console.wire.arguments import (
     OfDevice,
     OfEvent,
     OfferAnswered,
+    OfRegion,
     OfRobot,
     OfSome,
     PaceChange,
@@ -380,6 +381,14 @@ _LIST = (
         role=Role.SUPERVISE,
         over_link=True,
         seats=True,
+    ),
+    Action(
+        "give_back",
+        "gives a region back to its own DVA, which is there again",
+        OfRegion,
+        at=_RUN,
+        role=Role.SUPERVISE,
+        over_link=True,
     ),
     Action(
         "event_details",

@@ -100,6 +100,12 @@ class OfDevice(TypedDict):
     device: Name
 
 
+class OfRegion(TypedDict):
+    """One region, by its name."""
+
+    region: Name
+
+
 class LinkChange(TypedDict, total=False):
     """Change of the link."""
 

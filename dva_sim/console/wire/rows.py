@@ -95,11 +95,12 @@ RegionState = Literal["served", "deputy", "dead"]
 
 
 class RegionShown(TypedDict):
-    """A region, and in words who serves it."""
+    """A region, in words who serves it, and whether its own DVA may have it back."""
 
     name: str
     state: RegionState
     text: str
+    is_returnable: bool
 
 
 class RowsLine(TypedDict):

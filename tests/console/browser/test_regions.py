@@ -1,5 +1,6 @@
 """Several DVAs on the pages: the map with its regions, the column, and the alarm on each page."""
 
+from helpers.network.free_ports import free_port
 from helpers.processes.patience import becomes
 from playwright.sync_api import expect
 
@@ -34,6 +35,14 @@ def test_regions_are_on_the_map_in_the_table_and_an_alarm_if_their_dva_dies(cons
     page.goto(f"{at.base}#/map")
     expect(states).to_have_text([deputy, "served by dva-east"])
     assert becomes(lambda: f"west: {deputy}" in page.evaluate("[...window.words]"))
+
+    port = {"port": free_port()}
+    start = {"id": "start", "action": "server_start", "arguments": port}
+    assert visit.context.request.post(f"{at.base}api/actions", data=start).ok
+    button = page.get_by_role("button", name="Give west back")
+    expect(button).to_be_enabled()
+    button.click()
+    expect(states).to_have_text(["served by dva-west", "served by dva-east"])
 
 
 def test_of_one_dva_no_page_speaks_of_regions(console, shared):

@@ -123,6 +123,7 @@ GRANTED = {  # what the docs say of each address: a phrase, and the actions that
     "Console": {
         "takes robots from others": "take_over revoke",
         "hands decisions to people or to the policy": "dispatch_mode",
+        "gives regions back": "give_back",
     },
 }
 ADDRESSES = {"Console": "supervise", "Phone": "phone", **dict(ROLES)}

@@ -130,6 +130,25 @@ def test_a_dead_dva_is_an_alarm_until_its_region_is_its_own_again(monkeypatch):
     page.world.run.start_region_again(1)
     page.let(5.0)
     assert alarms(page)[f"{text} back, and may get it back"] == "high"
+    refused = page.ask("give_back", region="west", role="supervise")
+    assert (refused["ok"], refused["text"]) == (
+        False,
+        f"event {events(page)['fire']['number']} is assigned",
+    )
+    assert not page.world.recorder.broken
+
+
+def test_a_region_is_given_back_to_its_own_dva(monkeypatch):
+    page = hall(monkeypatch)
+    page.let(2.0)
+    page.world.run.end_dva(1)
+    page.until(lambda: regions(page)["west"] == "deputy")
+    assert not page.ask("give_back", region="west", role="supervise")["ok"]
+    page.world.run.start_region_again(1)
+    page.until(lambda: page.lines_of("rows")[-1]["regions"][0]["is_returnable"])
+    assert page.ask("give_back", region="west", role="supervise")["ok"]
+    page.until(lambda: regions(page) == {"west": "served", "east": "served"})
+    assert not page.ask("give_back", region="north", role="supervise")["ok"]
     assert not page.world.recorder.broken
 
 

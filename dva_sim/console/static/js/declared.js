@@ -57,6 +57,7 @@ export const PATIENCE_MS = {
  "mission": 65000,
  "mission_found": 65000,
  "take_over": 65000,
+ "give_back": 65000,
  "event_details": 10000,
  "event_tick": 10000,
  "hand_over": 10000,

@@ -121,8 +121,9 @@
  *   log?: 'unknown' | 'kept' | 'not_kept' | 'not_permitted'}} Server
  */
 /**
- * A region, and in words who serves it.
- * @typedef {{name: string, state: 'served' | 'deputy' | 'dead', text: string}} Region
+ * A region, in words who serves it, and whether its own DVA may have it back.
+ * @typedef {{name: string, state: 'served' | 'deputy' | 'dead', text: string,
+ *   is_returnable: boolean}} Region
  */
 /**
  * States of clock, link, robots and people, and of regions if there are several DVAs.

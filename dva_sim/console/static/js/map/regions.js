@@ -1,6 +1,7 @@
 /** Regions of a site with several DVAs: their borders, and who serves each. */
 import { html } from '../../vendor/preact.js';
-import { rows, scene } from '../store.js';
+import { isPast, maySteer, maySupervise, rows, scene } from '../store.js';
+import { act } from '../net/actions.js';
 import { lettersOn } from './lettering.js';
 
 const COLOURS = { served: 'room-name', deputy: 'warning', dead: 'danger' };
@@ -47,6 +48,8 @@ export function Regions() {
   return html`<section aria-label="Regions">
     <h2>Regions <span class="count">${regions.length}</span></h2>
     <ul class="rows">${regions.map((region) => html`<li class="row"><span></span><span class="what">${region.name}</span>
-      <span class="state"><span class=${region.state === 'served' ? '' : 'low'}>${region.text}</span></span></li>`)}</ul>
+      <span class="state"><span class=${region.state === 'served' ? '' : 'low'}>${region.text}</span>
+        ${region.is_returnable && !isPast.value && html`<button type="button" key="give-back" disabled=${!maySteer.value || !maySupervise.value}
+          onClick=${() => act('give_back', { region: region.name })}>Give ${region.name} back</button>`}</span></li>`)}</ul>
   </section>`;
 }
