@@ -24,7 +24,8 @@ SPARE = 0.30  # minimum distance of a rounded corner to a wall on top of the cle
 KEPT_FIELDS = 256
 KEPT_PATHS = 2048
 KEPT_MAPS = 4
-KEPT_NODES = 2**24  # maximum nodes of all cached fields together, 12 bytes each
+KEPT_NODES = 2**24  # maximum nodes of all cached fields of a map together, 12 bytes each
+KEPT_AROUND = 2**20  # likewise of a map with obstacles, which is soon another one
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -105,12 +106,13 @@ class Roadmap:
         grid: Grid of the cells.
         clearance: Radius that must fit [m].
         sight: From where it can be walked straight to a node.
-        room: Clearance of each cell, if other than the grid's [m].
+        room: Clearance of each cell, if obstacles make it other than the grid's [m].
     """
 
     def __init__(
         self, grid: OccupancyGrid, clearance: float, sight: Sight, room: Floats | None = None
     ) -> None:
+        kept_nodes = KEPT_NODES if room is None else KEPT_AROUND
         self._grid = grid
         self._clearance = clearance
         self.sight = sight
@@ -136,7 +138,7 @@ class Roadmap:
         self.around = lru_cache(KEPT_MAPS)(self._around)
         self.way = lru_cache(KEPT_PATHS)(self._way)
         self.length = lru_cache(KEPT_PATHS)(self._length)
-        kept = min(KEPT_FIELDS, max(1, KEPT_NODES // self._room.size))
+        kept = min(KEPT_FIELDS, max(1, kept_nodes // self._room.size))
         self._field_of = lru_cache(kept)(self._field)
 
     def _around(self, discs: tuple[Disc, ...]) -> Roadmap:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid
-from dva_sim.worlds.planning import Disc, Planner
+from dva_sim.worlds.planning import KEPT_AROUND, Disc, Planner
 from dva_sim.worlds.site import FOOTPRINT, load_site, map_site
 
 MAPS = TESTS / "data"
@@ -122,6 +122,16 @@ def test_a_way_keeps_its_clearance_from_what_the_plan_does_not_show():
         assert np.hypot(*(around - (5.0, y)).T).min() > 0.4 + 0.3 - 0.1
     assert length(around) < 1.15 * math.dist(start, goal)
     assert length(planner.path(start, goal)) == pytest.approx(7.0, rel=0.01)  # nothing is kept
+
+
+def test_of_a_map_with_obstacles_few_fields_are_kept():
+    planner = Planner(load_site("campus"), 0.3)
+    for x in range(12):
+        planner.path((1.0 + x, 1.0), (30.0 + 4 * x, 20.0), [Disc(20.0, 20.0, 0.4)])
+    around = planner._roadmap.around((Disc(20.0, 20.0, 0.4),))
+    kept = around._field_of.cache_info()
+    assert kept.misses > kept.currsize > 0
+    assert kept.currsize * around._room.size <= KEPT_AROUND
 
 
 def test_who_stands_in_the_only_door_leaves_no_way_and_one_beside_the_plan_changes_nothing():
