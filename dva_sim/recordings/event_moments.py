@@ -1,4 +1,4 @@
-"""Events of a recording at a moment, as the DVA's messages reported them at that time."""
+"""Events of a recording as messages: what a control room would have been told of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from dva_sim.core.events import Choice, Event, Handling, State
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.facts import Fact
 
-ROUNDED: Final = 0.0005  # rounding error of times on pages, in milliseconds [s]
 _STEPS: Final = (
     ("detected", State.PENDING),
     ("assigned", State.ASSIGNED),
@@ -20,25 +19,30 @@ _STEPS: Final = (
 )
 
 
-def statuses_at(
-    events: Iterable[Event], facts: Sequence[Fact], now: float
-) -> Iterator[m.EventStatus]:
-    """Yield the status of each event that was known at a moment [s].
+News = tuple[float, object]
+"""Body of a message that a control room hears, behind its time [s]."""
+
+
+def news_of(events: Iterable[Event], facts: Sequence[Fact]) -> Iterator[News]:
+    """Yield what a control room would have been told, event by event.
 
     Args:
         events: Events as the DVA knew them in the end.
         facts: Decisions, in order.
-        now: The moment [s].
     """
     for event in events:
-        if (then := _event_at(event, now)) is not None:
-            then.handling = _handling(facts, event.number, now)
-            yield status_of(then, None, now)
+        about = [fact for fact in facts if fact.event == event.number]
+        for now in sorted({*event.times.values(), *(fact.time for fact in about)}):
+            then = _event_at(event, now)
+            if then is not None:
+                then.handling = _handling(about, now)
+                yield now, status_of(then, None, now)
+            yield from ((now, fact.record()) for fact in about if fact.time == now)
 
 
 def _event_at(event: Event, now: float) -> Event | None:
     """Return an event as it stood at a moment; None if it was not known yet."""
-    times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
+    times = {step: time for step, time in event.times.items() if time <= now}
     if "detected" not in times:
         return None
     if "closed" in times:
@@ -60,11 +64,11 @@ def _event_at(event: Event, now: float) -> Event | None:
     return then
 
 
-def _handling(facts: Sequence[Fact], number: int, now: float) -> Handling:
-    """Return the decisions on an event up to a moment, if they were recorded."""
+def _handling(facts: Sequence[Fact], now: float) -> Handling:
+    """Return those of the decisions on an event that were made up to a moment."""
     handling = Handling()
     for fact in facts:
-        if fact.event != number or fact.time > now + ROUNDED or fact.code != m.OK:
+        if fact.time > now or fact.code != m.OK:
             continue
         choice = Choice(fact.author, fact.label, fact.action, fact.time, fact.cause)
         handling.decide(choice)

@@ -55,8 +55,7 @@ EXCEPTIONS = {
     | why("the room is unknown", alarms="row"),
     "recorded": UNTOLD
     | why("nobody asks what robots can show", robots="sensors", devices="camera sensors")
-    | why("nobody can act", alarms="row", devices="revocable")
-    | why("that somebody has seen an event counts as a decision", events="decided decisions"),
+    | why("nobody can act", alarms="row", devices="revocable"),
 }
 
 

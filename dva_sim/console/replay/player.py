@@ -249,7 +249,7 @@ class Player:
             "link": None,
             "dropped": self.dropped(),
             "robots": run.robots(now),
-            "people": run.people(now),
+            "people": run.bench.people(now),
             "order": None,
             "regions": run.system.regions(now),
         }
@@ -355,7 +355,7 @@ class Player:
         if self.run is None:
             raise Refused("No recording is played.")
         labels = self.run.playback.labels
-        histories = self.run.histories(self.now)
+        histories = self.run.system.room(self.now).histories
         details = details_shown(line.get("event"), histories, lambda who: labels.get(who, who))
         on_result(True, "", details=details)
 

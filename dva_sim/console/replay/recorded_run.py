@@ -7,24 +7,15 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable
 from typing import Any
 
-from dva_sim.agents.control_room.history import EventHistory
-from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
-from dva_sim.console.bench import Status
 from dva_sim.console.dva.device_rows import listed_device_row
-from dva_sim.console.replay.moments import (
-    RecordedTracks,
-    captured_at,
-    commands_hz,
-    set_point,
-)
+from dva_sim.console.replay.recorded_bench import ROUNDED, RecordedBench, captured_at
 from dva_sim.console.replay.recorded_system import RecordedSystem
 from dva_sim.console.replay.robot_lines import about, robot_window
 from dva_sim.console.system.things import UNKNOWN_PERSON, Things, camera_shown
-from dva_sim.console.views.event_rows import event_row
+from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.published_rows import robot_row
@@ -32,18 +23,12 @@ from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.events import EventsLine, HazardsLine, StorySoFarLine
 from dva_sim.console.wire.rows import (
     DevicesLine,
-    DoingShown,
     PlacesLine,
     RobotRow,
     RobotWindowLine,
 )
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.kernel.recorder import DriveLog, Sent
-from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.facts import Fact
-from dva_sim.recordings.event_moments import ROUNDED, statuses_at
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.scenario import plan_of, robot_profiles
 
@@ -66,8 +51,8 @@ class RecordedRun:
         numbers: By which lines call them, by id and by label.
         duration: Length [s].
         audit: The rows of the console's audit log, if it had one.
-        system: Devices and DVAs, by their messages.
-        tracks: Tracks of everybody.
+        bench: Its bodies, drives, and the book of the DVA.
+        system: Devices, DVAs and events, by their messages.
     """
 
     def __init__(self, opened: Opened, name: str) -> None:
@@ -79,13 +64,9 @@ class RecordedRun:
         self.things = Things()
         self.numbers = self.things.numbers
         self._number_all()
-        self.tracks = RecordedTracks(playback.recorder.tracks, playback.duration)
         self._moments = [moment.time for moment in playback.recorder.timeline]
-        self._drives: dict[str, list[DriveLog]] = {}
-        for drive in playback.recorder.drives:
-            self._drives.setdefault(drive.robot, []).append(drive)
-        self._facts = playback.facts or _facts_heard(playback.recorder.traffic or ())
-        self.system = RecordedSystem(playback, self._look)
+        self.bench = RecordedBench(playback, self.numbers)
+        self.system = RecordedSystem(playback, self.bench)
         self._hazards = HazardFeed(
             playback.site,
             incidents=playback.incidents,
@@ -183,7 +164,7 @@ class RecordedRun:
                 round(1000 * math.remainder(at.heading, 2.0 * math.pi)),
                 round(1000 * speed),
             ]
-            for label, at, speed in self.tracks.places(now)
+            for label, at, speed in self.bench.places(now)
         ]
         return {"k": "pos", "t": _ms(now), "p": rows}
 
@@ -197,55 +178,21 @@ class RecordedRun:
         row = robot_row(state, self.numbers[id_tag], now, self.playback.labels)
         row["pattern"] = self.playback.scenario.pattern
         row["silent"] = self.system.is_lost(state, now)
-        del row["camera"]  # its pictures are drawn here
-        drive = self._drive_of(id_tag, now)
-        if drive is not None:
-            is_driven = row["mode"] == Mode.TELEOPERATION.value
-            speed, turn_rate = set_point(drive if is_driven else None, now)
-            row["set_speed_mps"], row["set_turn_rate_radps"] = round(speed, 3), round(turn_rate, 3)
-            row["commands_hz"] = commands_hz(drive, now)
+        self.bench.complete(id_tag, row, now)
         return row
-
-    def _look(self, device: str, now: float) -> Status | None:
-        """Return the status of a device by its track; None if it has none then."""
-        place = self.tracks.place(self.playback.labels.get(device, ""), now)
-        if place is None:
-            return None
-        at, speed = place
-        position = m.Position(*self.playback.site.frame.to_latlon(at.x, at.y))
-        if device not in self.playback.radii:
-            return m.PersonStatus(at.mode, position)
-        return m.RobotStatus(at.mode, position, at.heading, speed, 0.0, 0)
 
     def window(self, id_tag: str, now: float) -> RobotWindowLine:
         """Return the contents of a robot's windows."""
         label = self.playback.labels[id_tag]
-        here = self.tracks.place(label, now)
-        before = self.tracks.place(label, now - TURNING)
+        here = self.bench.place(label, now)
+        before = self.bench.place(label, now - TURNING)
         turned = 0.0
         if here and before:
             turned = math.remainder(here[0].heading - before[0].heading, 2.0 * math.pi) / TURNING
         row = self._robot(id_tag, now)
-        drives = self._drives.get(id_tag, ())
+        drives = self.bench.drives.get(id_tag, ())
         speed = here[1] if here else 0.0
         return robot_window(row, drives, speed=speed, turn_rate=turned, now=now)
-
-    def _drive_of(self, robot: str, now: float) -> DriveLog | None:
-        """Return the drive that goes on, if one does."""
-        for drive in reversed(self._drives.get(robot, [])):
-            if drive.ordered <= now:
-                over = drive.ended is not None and drive.ended <= now
-                return None if over else drive
-        return None
-
-    def people(self, now: float) -> list[DoingShown]:
-        """Return the activities of people on foot."""
-        radii = {self.playback.labels[robot] for robot in self.playback.radii}
-        return [
-            {"i": self.numbers[label], "doing": at.mode}
-            for label, at, _ in self.tracks.places(now)
-            if label not in radii
-        ]
 
     def devices(self, now: float) -> DevicesLine:
         """Return the table of devices."""
@@ -269,28 +216,9 @@ class RecordedRun:
 
     def events(self, now: float) -> EventsLine:
         """Return the states of the events."""
-        playback = self.playback
-        site = playback.site
-        lines = [
-            event_row(status, received_at=now, labels=playback.labels, site=site, frame=site.frame)
-            for status in statuses_at(playback.events, self._facts, now)
-        ]
-        return {"k": "events", "t": _ms(now), "events": lines}
-
-    def histories(self, now: float) -> dict[int, EventHistory]:
-        """Return the histories of events, as a control room would have heard them by then."""
-        history_by_event: dict[int, EventHistory] = {}
-        for event in self.playback.events:
-            facts = [fact for fact in self._facts if fact.event == event.number]
-            moments = {*event.times.values(), *(fact.time for fact in facts)}
-            for moment in sorted(time for time in moments if time <= now + ROUNDED):
-                history = history_by_event.setdefault(event.number, EventHistory())
-                for status in statuses_at([event], facts, moment):
-                    history.hear_status(status, moment)
-                for fact in facts:
-                    if fact.time == moment:
-                        history.hear_record(fact.record(), moment)
-        return history_by_event
+        site = self.playback.site
+        rows = event_rows(self.system.room(now), self.playback.labels, site, site.frame)
+        return {"k": "events", "t": _ms(now), "events": rows}
 
     def story(self, now: float) -> StorySoFarLine:
         """Return the story up to a moment."""
@@ -309,12 +237,12 @@ class RecordedRun:
 
         The picture is drawn from where everybody was when it was taken.
         """
-        drive = self._drive_of(robot, now)
+        drive = self.bench.drive(robot, now)
         captured = now if drive is None else captured_at(drive, now)
         if captured is None:
             return None
         label = self.playback.labels[robot]
-        there = list(self.tracks.places(captured))
+        there = list(self.bench.places(captured))
         own = next((at for name, at, _ in there if name == label), None)
         if own is None:
             return None
@@ -336,20 +264,6 @@ class RecordedRun:
             "pose": [round(own.x, 3), round(own.y, 3), round(own.heading, 4)],
             "figures": figures,
         }
-
-
-def _facts_heard(traffic: Iterable[Sent]) -> list[Fact]:
-    """Return the decisions that the DVA told the first control room that heard of any."""
-    records = [
-        (sent, body)
-        for sent in traffic
-        if isinstance(sent.payload, bytes)
-        and b"<AuditRecord>" in sent.payload
-        and isinstance(body := decode(sent.payload).body, m.AuditRecord)
-    ]
-    room = records[0][0].destination if records else ""
-    heard = (Fact.of_record(body, sent.time) for sent, body in records if sent.destination == room)
-    return [*dict.fromkeys(heard)]  # one that it subscribed to twice came twice
 
 
 def _ms(time: float) -> int:

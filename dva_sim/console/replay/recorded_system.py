@@ -1,25 +1,32 @@
-"""A recorded system at a moment: its devices, as a console would have heard them by then."""
+"""A recorded system at a moment: devices and events, as a console would have heard of them."""
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from operator import attrgetter
-from typing import Final, TypeVar
+from typing import Final, NoReturn, TypeVar
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.device import AgentDevice
 from dva_sim.console.bench import Status
+from dva_sim.console.replay.recorded_bench import ROUNDED, RecordedBench
+from dva_sim.console.system.known_system import SOMEWHERE
 from dva_sim.console.system.served_regions import regions_of
 from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.views.published_rows import SILENT_AFTER
 from dva_sim.console.wire.rows import RegionShown
+from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.rates import RATE_OVER
-from dva_sim.kernel.recorder import Sent
+from dva_sim.kernel.recorder import Recorder, Sent
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.devices import ROBOT
+from dva_sim.protocol.codec import decode, decode_if_valid
+from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.recordings.event_moments import News
 from dva_sim.simulation.full import Playback
 
 HOLDER_LAPSES: Final = 3.5  # a robot that is held says so each second; who asks hears it [s]
@@ -34,26 +41,57 @@ _KINDS: Final = {
 }
 _TIME: Final = attrgetter("time")
 _KIND: Final = re.compile(rb"<(" + b"|".join(_KINDS) + rb")>")
+_TOLD: Final = re.compile(rb"<(EventStatus|EventList|AuditRecord)>")
 Body = TypeVar("Body")
 
 
+class RecordedRoom(ControlRoomAgent):
+    """A control room in the time of a recording, which its clock leads through.
+
+    Args:
+        news: Messages about events, with their times.
+    """
+
+    def __init__(self, news: Iterable[News]) -> None:
+        clock = Clock()
+        super().__init__(
+            AgentDevice(
+                id_tag="",  # it sends nothing, and nobody knows it
+                label="",
+                device_type=CONTROL_ROOM,
+                address="",
+                dva="",
+                network=VirtualNetwork(clock, _unlinked),
+                recorder=Recorder(),
+                frame=SOMEWHERE,
+                timeout=0.0,
+                attempts=0,
+            )
+        )
+        for time, body in news:
+            clock.call_at(time, self._take, body)
+
+
 class RecordedSystem:
-    """Devices of a recording.
+    """Devices and events of a recording.
 
     Args:
         playback: The recording.
-        look: Function that returns the status of a device at a moment [s], from recorded tracks.
+        bench: Its bodies, drives, and the book of the DVA.
     """
 
-    def __init__(self, playback: Playback, look: Callable[[str, float], Status | None]) -> None:
-        self._look = look
+    def __init__(self, playback: Playback, bench: RecordedBench) -> None:
+        self._look = bench.status
         self._labels: Mapping[str, str] = playback.labels
         self._regions = regions_of(playback.scenario)
         self._said: dict[tuple[str, type], list[Sent]] = {}  # by sender and kind
         self._heard: dict[str, list[float]] = {}  # times at which a DVA was sent something
+        self._told: dict[bytes, float] = {}  # what DVAs told of events, and when [s]
         for sent in playback.recorder.traffic or ():
             if isinstance(sent.payload, bytes):
                 self._take(sent)
+        self._news = [*_readable(self._told)] or [*bench.news()]
+        self._room = RecordedRoom(self._news)
 
     def _take(self, sent: Sent) -> None:
         if sent.destination in self._regions.labels:
@@ -62,6 +100,15 @@ class RecordedSystem:
             said = self._said.setdefault((sent.source, _KINDS[kind[1]]), [])
             if not said or said[-1].payload != sent.payload:  # else a copy for somebody else
                 said.append(sent)
+        elif sent.source in self._regions.labels and _TOLD.search(sent.payload):
+            self._told.setdefault(sent.payload, sent.time)  # the same for all who heard it
+
+    def room(self, now: float) -> RecordedRoom:
+        """Return a control room that has heard what was told of events by a moment [s]."""
+        if now < self._room.device.clock.now - 2 * ROUNDED:
+            self._room = RecordedRoom(self._news)
+        self._room.device.clock.run(now + ROUNDED)
+        return self._room
 
     def devices(self, now: float) -> list[DeviceState]:
         """Return the devices that had asked a DVA for their registration by a moment [s]."""
@@ -122,3 +169,16 @@ class RecordedSystem:
             if end and isinstance(body := decode(said[end - 1].payload).body, kind):
                 return body, said[end - 1].time, said[end - 1].destination
         return None
+
+
+def _readable(told: Mapping[bytes, float]) -> Iterator[News]:
+    """Yield what messages of a DVA and its replies hold, with their times."""
+    for data, time in told.items():
+        message = decode_if_valid(data)
+        if message is not None:
+            body = message.body
+            yield time, body.content if isinstance(body, m.Reply) else body
+
+
+def _unlinked(node: str, peer: str) -> NoReturn:
+    raise LookupError("a recording has no links")

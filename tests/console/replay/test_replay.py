@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 from helpers.console.declared_lines import at_page, checked
+from helpers.console.recorded_console import RecordedPage
+from helpers.console.simulated_phone import FIRE, PhonePage
 from recordings.runs import drill, evacuation
 
 from dva_sim.cameras.lines import PaintersLine
@@ -105,6 +107,38 @@ def test_the_history_of_an_event_is_told_up_to_the_moment(recorded, playing):
     assert [step["event"] for step in newest] == [1, 1, 2, 2]
 
 
+def states(run, now):
+    return [row["state"] for row in run.events(now)["events"]]
+
+
+def test_a_jump_back_unlearns_what_was_heard_since(recorded):
+    assert states(recorded, 90.0) == ["assigned", "assigned"]
+    assert states(recorded, 64.0) == ["assigned"]
+    assert states(recorded, 63.9) == []
+
+
+def test_an_event_that_was_assigned_twice_was_assigned_in_between(monkeypatch, tmp_path):
+    page = PhonePage(monkeypatch, bystander__count=0, events=FIRE, dispatch__mode="ask_first")
+    kept = RecordedPage(page, tmp_path / "run.mcap")
+    page.let(4.0)
+    dispatcher = {"event": 1, "device": "robot-2", "role": "supervise"}
+    assert page.do("event_assign", **dispatcher)[0]
+    page.let(2.0)
+    assert page.do("event_take_off", **dispatcher)[0]
+    page.let(2.0)
+    assert page.do("event_assign", **dispatcher)[0]
+    page.let(2.0)
+    kept.finish()
+    run = RecordedRun(read_recording(tmp_path / "run.mcap"), "run.mcap")
+    (known,) = run.playback.events
+    assert known.times["assigned"] > 8.0, "the DVA knows the second time alone"
+    assert [states(run, now) for now in (5.0, 7.0, 9.0)] == [
+        ["assigned"],
+        ["pending"],
+        ["assigned"],
+    ]
+
+
 def test_without_a_recording_there_is_no_history(files, playing):
     page = playing(None, Shelf(files))
     assert page.ask("event_details", event=1)["text"] == "No recording is played."
@@ -113,7 +147,7 @@ def test_without_a_recording_there_is_no_history(files, playing):
 def test_everybody_is_where_the_run_had_them(recorded):
     for label, track in drill().recorder.tracks.items():
         for point in track[:: max(1, len(track) // 7)]:
-            here = {name: at for name, at, _ in recorded.tracks.places(point.time)}
+            here = {name: at for name, at, _ in recorded.bench.places(point.time)}
             assert here[label].x == pytest.approx(point.x, abs=1e-3)
             assert here[label].y == pytest.approx(point.y, abs=1e-3)
             assert here[label].mode == point.mode
@@ -127,7 +161,7 @@ def test_between_two_points_of_a_track_somebody_glides(recorded):
         if a.x != b.x
     )
     middle = (one.time + two.time) / 2
-    at, speed = next((at, v) for name, at, v in recorded.tracks.places(middle) if name == who)
+    at, speed = next((at, v) for name, at, v in recorded.bench.places(middle) if name == who)
     assert at.x == pytest.approx((one.x + two.x) / 2, abs=1e-3)
     way = math.dist((one.x, one.y), (two.x, two.y))
     assert speed == pytest.approx(way / (two.time - one.time), abs=1e-2)
@@ -135,7 +169,7 @@ def test_between_two_points_of_a_track_somebody_glides(recorded):
 
 def test_who_has_left_the_site_is_not_there_any_more(files):
     run = RecordedRun(read_recording(files / "evacuation.mcap"), "evacuation")
-    there = [len(list(run.tracks.places(when))) for when in (1.0, run.duration - 5.0)]
+    there = [len(list(run.bench.places(when))) for when in (1.0, run.duration - 5.0)]
     assert there[1] < there[0]
 
 
