@@ -13,6 +13,7 @@ from helpers.console.simulated_phone import FIRE, PhonePage
 from dva_sim.console.replay.player import Player
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.wire.actions import ACTIONS, ActionPlace
+from dva_sim.protocol.devices import FORGET_AFTER
 from dva_sim.recordings.reading import read_recording
 
 Line = dict[str, Any]
@@ -127,6 +128,8 @@ def story(page: PhonePage) -> Iterator[str]:
     assert page.do("fault", robot="robot-2", what="freeze", on=True)[0]
     page.let(MISSED)
     yield "lost"
+    page.let(FORGET_AFTER + MISSED)
+    yield "lost for long"
 
 
 @pytest.fixture(scope="module")
@@ -201,8 +204,9 @@ def test_the_story_is_told(carriers):
     assert (modes["reported"], modes["driven"]) == ("Idle", "Teleoperation")
     assert (modes["stopped"], modes["released"]) == ("Emergency", "Idle")
     silent = {moment: rows["robots"]["robot-2"]["silent"] for moment, rows in at.items()}
-    assert (silent["closed"], silent["lost"]) == (False, True)
-    assert any("robot-2 is lost" in text for text in at["lost"]["alarms"])
+    assert (silent["closed"], silent["lost"], silent["lost for long"]) == (False, True, True)
+    for moment in ("lost", "lost for long"):
+        assert any("robot-2 is lost" in text for text in at[moment]["alarms"])
 
 
 def test_all_show_the_same_but_for_what_they_cannot_know(carriers, other):

@@ -101,7 +101,6 @@ class KnownSystem:
         self._started = 0.0
         self._foreign: set[str] = set()
         self._here: dict[str, str] = {}  # labels of those from outside who are shown, by id
-        self._met: set[str] = set()  # devices that the DVA has ever listed
         self._listed: dict[str, float] = {}  # time of each DVA's newest list of devices [s]
         self._forgotten = -math.inf  # time at which the DVA last knew nothing of this console [s]
         self._asked = -POLL
@@ -241,7 +240,6 @@ class KnownSystem:
 
     def _number_all(self) -> None:
         """Give robots and guards from outside a number, which stays theirs."""
-        self._met.update(self.state.devices)
         foreign = [id_tag for id_tag in self._foreign if id_tag in self.state.devices]
         room = MAX_THINGS - len(foreign)
         for id_tag, entry in self.state.devices.items():
@@ -274,12 +272,8 @@ class KnownSystem:
         """
         if self.clock.now - self._forgotten < RENEW_PERIOD + POLL:
             return False
-        entry = self.state.devices.get(id_tag)
-        return (
-            id_tag in self._met
-            if entry is None
-            else entry.listed < self._listed.get(entry.dva, -math.inf)
-        )
+        entry = self.state.devices[id_tag]
+        return entry.listed < self._listed.get(entry.dva, -math.inf)
 
     def dva_of(self, id_tag: str) -> str | None:
         """Return the id of the DVA that lists a device; None if none does."""

@@ -15,6 +15,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import FORGET_AFTER, GUARD, ROBOT
 
+MAX_LOST: Final = 100  # devices with a position that are kept though no DVA lists them any more
 TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER, EMERGENCY), GUARD: (HEARTBEAT, STATUS)}
 
 
@@ -102,8 +103,9 @@ class SystemState:
                 label = self._labels[device.id_tag]  # its person may have given it another one
             self.meet(replace(device, label=label), dva, self._now)
         late = [i for i, entry in self.devices.items() if self._now - entry.listed > FORGET_AFTER]
+        lost = [id_tag for id_tag in late if self.devices[id_tag].status is not None][-MAX_LOST:]
         for id_tag in late:
-            if self._look(id_tag) is None:
+            if id_tag not in lost:  # which stands where it was last, and may need help
                 self.forget(id_tag)
         if {(i, entry.device) for i, entry in self.devices.items()} != before:
             self._on_news()
