@@ -69,29 +69,6 @@ class Fact:
         """Return the fact by names, as plain numbers and words that JSON can hold."""
         return asdict(self)
 
-    @classmethod
-    def of_record(cls, record: m.AuditRecord, time: float) -> Fact:
-        """Return the fact of a message that was heard at a time [s]."""
-        return cls(
-            time=time,
-            author=record.author,
-            label=record.label,
-            action=record.action,
-            role=record.role,
-            event=record.event_id,
-            device=record.device,
-            operator=record.operator,
-            task=record.task,
-            arrival_in=record.arrival_in,
-            mode=record.dispatch_mode,
-            text=record.note,
-            cause=record.reason,
-            code=record.code,
-            outcome=record.text,
-            advised=record.advised,
-            advised_in=record.advised_in,
-        )
-
     def record(self) -> m.AuditRecord:
         """Return the fact as a message, as far as a message can hold it."""
         return m.AuditRecord(

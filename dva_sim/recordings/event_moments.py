@@ -33,14 +33,12 @@ def news_of(events: Iterable[Event], facts: Sequence[Fact]) -> Iterator[News]:
     for event in events:
         about = [fact for fact in facts if fact.event == event.number]
         for now in sorted({*event.times.values(), *(fact.time for fact in about)}):
-            then = _event_at(event, now)
-            if then is not None:
-                then.handling = _handling(about, now)
+            if (then := _event_at(event, about, now)) is not None:
                 yield now, status_of(then, None, now)
             yield from ((now, fact.record()) for fact in about if fact.time == now)
 
 
-def _event_at(event: Event, now: float) -> Event | None:
+def _event_at(event: Event, facts: Sequence[Fact], now: float) -> Event | None:
     """Return an event as it stood at a moment; None if it was not known yet."""
     times = {step: time for step, time in event.times.items() if time <= now}
     if "detected" not in times:
@@ -58,6 +56,7 @@ def _event_at(event: Event, now: float) -> Event | None:
         operator=event.operator if sent else None,
         actor=event.actor if "act_assigned" in times else None,
         times=times,
+        handling=_handling(facts, now),
     )
     if not then.open:  # live runs do not keep when
         times.setdefault("closed", max(times.values()))

@@ -354,9 +354,8 @@ class Player:
     def _details(self, _: str, line: DetailsAsked, on_result: OnResult) -> None:
         if self.run is None:
             raise Refused("No recording is played.")
-        labels = self.run.playback.labels
         histories = self.run.system.room(self.now).histories
-        details = details_shown(line.get("event"), histories, lambda who: labels.get(who, who))
+        details = details_shown(line.get("event"), histories, self.run.playback.label_of)
         on_result(True, "", details=details)
 
     @does("watch")

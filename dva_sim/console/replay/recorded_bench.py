@@ -63,8 +63,7 @@ class RecordedBench:
 
     def status(self, device: str, now: float) -> Status | None:
         """Return the status of a device by its track; None if it has none then."""
-        place = self.place(self._playback.labels.get(device, ""), now)
-        if place is None:
+        if (place := self.place(self._playback.labels.get(device, ""), now)) is None:
             return None
         at, speed = place
         position = m.Position(*self._playback.site.frame.to_latlon(at.x, at.y))
@@ -74,18 +73,16 @@ class RecordedBench:
 
     def people(self, now: float) -> list[DoingShown]:
         """Return the activities of people on foot."""
-        radii = {self._playback.labels[robot] for robot in self._playback.radii}
         return [
             {"i": self._numbers[label], "doing": at.mode}
             for label, at, _ in self.places(now)
-            if label not in radii
+            if self._playback.robot_named(label) is None
         ]
 
     def complete(self, robot: str, row: RobotRow, now: float) -> None:
         """Add to the row of a robot what is recorded of its drive."""
         del row["camera"]  # its pictures are drawn here
-        drive = self.drive(robot, now)
-        if drive is not None:
+        if (drive := self.drive(robot, now)) is not None:
             is_driven = row["mode"] == Mode.TELEOPERATION.value
             speed, turn_rate = set_point(drive if is_driven else None, now)
             row["set_speed_mps"], row["set_turn_rate_radps"] = round(speed, 3), round(turn_rate, 3)

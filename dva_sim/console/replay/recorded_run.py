@@ -191,8 +191,7 @@ class RecordedRun:
             turned = math.remainder(here[0].heading - before[0].heading, 2.0 * math.pi) / TURNING
         row = self._robot(id_tag, now)
         drives = self.bench.drives.get(id_tag, ())
-        speed = here[1] if here else 0.0
-        return robot_window(row, drives, speed=speed, turn_rate=turned, now=now)
+        return robot_window(row, drives, speed=here[1] if here else 0.0, turn_rate=turned, now=now)
 
     def devices(self, now: float) -> DevicesLine:
         """Return the table of devices."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from operator import attrgetter
 from typing import Final, NoReturn, TypeVar
@@ -86,11 +86,16 @@ class RecordedSystem:
         self._regions = regions_of(playback.scenario)
         self._said: dict[tuple[str, type], list[Sent]] = {}  # by sender and kind
         self._heard: dict[str, list[float]] = {}  # times at which a DVA was sent something
-        self._told: dict[bytes, float] = {}  # what DVAs told of events, and when [s]
-        for sent in playback.recorder.traffic or ():
-            if isinstance(sent.payload, bytes):
-                self._take(sent)
-        self._news = [*_readable(self._told)] or [*bench.news()]
+        traffic = [s for s in playback.recorder.traffic or () if isinstance(s.payload, bytes)]
+        for sent in traffic:
+            self._take(sent)
+        told = [s for s in traffic if s.source in self._regions.labels and _TOLD.search(s.payload)]
+        heard = [
+            (time, getattr(message.body, "content", message.body))  # that of a reply, or itself
+            for time, data in dict.fromkeys((s.time, s.payload) for s in told)  # once for all rooms
+            if (message := decode_if_valid(data)) is not None
+        ]
+        self._news = heard or [*bench.news()]
         self._room = RecordedRoom(self._news)
 
     def _take(self, sent: Sent) -> None:
@@ -100,8 +105,6 @@ class RecordedSystem:
             said = self._said.setdefault((sent.source, _KINDS[kind[1]]), [])
             if not said or said[-1].payload != sent.payload:  # else a copy for somebody else
                 said.append(sent)
-        elif sent.source in self._regions.labels and _TOLD.search(sent.payload):
-            self._told.setdefault(sent.payload, sent.time)  # the same for all who heard it
 
     def room(self, now: float) -> RecordedRoom:
         """Return a control room that has heard what was told of events by a moment [s]."""
@@ -112,9 +115,12 @@ class RecordedSystem:
 
     def devices(self, now: float) -> list[DeviceState]:
         """Return the devices that had asked a DVA for their registration by a moment [s]."""
-        ids = [who for who, kind in self._said if kind is m.Registration]
-        states = (self.device(who, now) for who in ids if who not in self._regions.labels)
-        return [state for state in states if state.dva]
+        return [
+            state
+            for who, kind in self._said
+            if kind is m.Registration and who not in self._regions.labels
+            if (state := self.device(who, now)).dva
+        ]
 
     def device(self, who: str, now: float) -> DeviceState:
         """Return a device at a moment [s]; its DVA is empty until it asks for a registration."""
@@ -169,15 +175,6 @@ class RecordedSystem:
             if end and isinstance(body := decode(said[end - 1].payload).body, kind):
                 return body, said[end - 1].time, said[end - 1].destination
         return None
-
-
-def _readable(told: Mapping[bytes, float]) -> Iterator[News]:
-    """Yield what messages of a DVA and its replies hold, with their times."""
-    for data, time in told.items():
-        message = decode_if_valid(data)
-        if message is not None:
-            body = message.body
-            yield time, body.content if isinstance(body, m.Reply) else body
 
 
 def _unlinked(node: str, peer: str) -> NoReturn:
