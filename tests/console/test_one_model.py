@@ -39,14 +39,17 @@ def why(reason: str, **fields: str) -> dict[tuple[str, str], str]:
 
 UNTOLD = why(
     "no message tells it",
-    robots="battery by_hand commands_hz lost queue refused timeouts emergency.released_by"
-    " set_speed_mps set_turn_rate_radps stop_reason watchdog_left_s",
+    robots="battery by_hand lost queue refused stop_reason timeouts emergency.released_by"
+    " watchdog_left_s",
     devices="commands_hz level refused picture_age_s round_trip_s",
 ) | why("who sits where is known to the console with that seat", robots="emergency.by")
 ATTACHED = (
     UNTOLD
     | why("the own run draws the pictures itself", robots="camera")
-    | why("one DVA alone never says what it is called", devices="dva")
+    | why(
+        "a command is for its robot alone",
+        robots="commands_hz set_speed_mps set_turn_rate_radps",
+    )
 )
 EXCEPTIONS = {
     "attached": ATTACHED,
@@ -55,8 +58,17 @@ EXCEPTIONS = {
     | why("the origin of an unknown site is where somebody was first", events="room x_m y_m")
     | why("the room is unknown", alarms="row"),
     "recorded": UNTOLD
-    | why("nobody asks what robots can show", robots="sensors", devices="camera sensors")
-    | why("nobody can act", alarms="row", devices="revocable"),
+    | why(
+        "commands are counted as they are made, not as they take effect",
+        robots="commands_hz",
+    )
+    | why(
+        "a replay asks nobody what robots can show",
+        robots="sensors",
+        devices="camera sensors",
+    )
+    | why("what people do about alarms is in no message", alarms="row")
+    | why("nobody can act", devices="revocable"),
 }
 
 
@@ -156,6 +168,7 @@ def carriers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Car
             moments[moment] = page.world.clock.now
             for carrier in live.values():
                 carrier.at[moment] = carrier.rows()
+            page.let(0.1)  # else what is done next falls into the same moment
         recorded.finish()
         player = Player(RecordedRun(read_recording(file), "run.mcap"))
         told: list[Line] = []

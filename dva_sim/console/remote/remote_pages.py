@@ -76,7 +76,7 @@ class RemotePages(ConsolePages):
             links.own, "control room", CONTROL_ROOM, address=links.address, frame=frame
         )
         dvas = dvas_of(scenario)
-        links.labels.update(dvas if len(dvas) > 1 else {})
+        links.labels.update(dvas)
         others = [
             links.device(
                 id_tag,

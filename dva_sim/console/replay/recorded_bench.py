@@ -82,11 +82,12 @@ class RecordedBench:
     def complete(self, robot: str, row: RobotRow, now: float) -> None:
         """Add to the row of a robot what is recorded of its drive."""
         del row["camera"]  # its pictures are drawn here
-        if (drive := self.drive(robot, now)) is not None:
-            is_driven = row["mode"] == Mode.TELEOPERATION.value
+        drive = self.drive(robot, now)
+        is_driven = row["mode"] == Mode.TELEOPERATION.value
+        if drive is not None or not is_driven:  # else somebody drives of whom nothing is recorded
             speed, turn_rate = set_point(drive if is_driven else None, now)
             row["set_speed_mps"], row["set_turn_rate_radps"] = round(speed, 3), round(turn_rate, 3)
-            row["commands_hz"] = commands_hz(drive, now)
+            row["commands_hz"] = commands_hz(drive, now) if drive is not None else 0.0
 
     def drive(self, robot: str, now: float) -> DriveLog | None:
         """Return the drive of a robot that goes on, if one does."""

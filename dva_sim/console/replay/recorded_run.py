@@ -18,7 +18,7 @@ from dva_sim.console.system.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
-from dva_sim.console.views.published_rows import robot_row
+from dva_sim.console.views.published_rows import place_shown, robot_row
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.events import EventsLine, HazardsLine, StorySoFarLine
 from dva_sim.console.wire.rows import (
@@ -157,16 +157,14 @@ class RecordedRun:
 
     def positions(self, now: float) -> PlacesLine:
         """Return the positions of everybody."""
-        rows = [
-            [
-                self.numbers[label],
-                *(round(100 * at.x), round(100 * at.y)),
-                round(1000 * math.remainder(at.heading, 2.0 * math.pi)),
-                round(1000 * speed),
-            ]
-            for label, at, speed in self.bench.places(now)
-        ]
-        return {"k": "pos", "t": _ms(now), "p": rows}
+        return {
+            "k": "pos",
+            "t": _ms(now),
+            "p": [
+                place_shown(self.numbers[label], (at.x, at.y), at.heading, speed)
+                for label, at, speed in self.bench.places(now)
+            ],
+        }
 
     def robots(self, now: float) -> list[RobotRow]:
         """Return a row for each robot."""
@@ -186,12 +184,14 @@ class RecordedRun:
         label = self.playback.labels[id_tag]
         here = self.bench.place(label, now)
         before = self.bench.place(label, now - TURNING)
-        turned = 0.0
-        if here and before:
-            turned = math.remainder(here[0].heading - before[0].heading, 2.0 * math.pi) / TURNING
-        row = self._robot(id_tag, now)
-        drives = self.bench.drives.get(id_tag, ())
-        return robot_window(row, drives, speed=here[1] if here else 0.0, turn_rate=turned, now=now)
+        turned = here[0].heading - before[0].heading if here and before else 0.0
+        return robot_window(
+            self._robot(id_tag, now),
+            self.bench.drives.get(id_tag, ()),
+            speed=here[1] if here else 0.0,
+            turn_rate=math.remainder(turned, 2.0 * math.pi) / TURNING,
+            now=now,
+        )
 
     def devices(self, now: float) -> DevicesLine:
         """Return the table of devices."""
@@ -216,18 +216,17 @@ class RecordedRun:
     def events(self, now: float) -> EventsLine:
         """Return the states of the events."""
         site = self.playback.site
-        rows = event_rows(self.system.room(now), self.playback.labels, site, site.frame)
-        return {"k": "events", "t": _ms(now), "events": rows}
+        return {
+            "k": "events",
+            "t": _ms(now),
+            "events": event_rows(self.system.room(now), self.playback.labels, site, site.frame),
+        }
 
     def story(self, now: float) -> StorySoFarLine:
         """Return the story up to a moment."""
         end = bisect_right(self._moments, now + ROUNDED)
         moments = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
-        return {
-            "k": "story_so_far",
-            "t": _ms(now),
-            "lines": [moment_shown(moment) for moment in moments],
-        }
+        return {"k": "story_so_far", "t": _ms(now), "lines": [*map(moment_shown, moments)]}
 
     # --- pictures --------------------------------------------------------------------------
 

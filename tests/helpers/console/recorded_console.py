@@ -5,6 +5,7 @@ from pathlib import Path
 
 from helpers.console.simulated_phone import PhonePage
 
+from dva_sim.console.world.world import TIDY
 from dva_sim.live.kept_facts import keep_run
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.serving.pipes import PipeEnd
@@ -26,6 +27,7 @@ class RecordedPage:
         world.recorder.kept = LiveRecorder(world.clock, self._outlet)
         world.recorder.kept.is_own = world.is_ours
         keep_run(world.run, world.recorder.kept)
+        world.clock.every(TIDY, world.recorder.tidy)
 
     def finish(self) -> None:
         """Write the recording."""
