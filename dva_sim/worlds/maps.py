@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.suggestions import guess
 from dva_sim.kernel.yaml_files import Document, beside, load_yaml, with_named_files
@@ -32,6 +33,7 @@ CHANCE_SHARE = 0.01  # share of a map's cells that may have a shade by chance
 JPEG_BLUR = 12.0  # maximum error of shades in a JPEG: half a step to white
 USUAL_CELLS = 0.005, 1.0  # usual range of cell sizes of a map [m]
 MAX_CELLS = 40e6  # maximum cells of a grid: planning on it takes some gigabytes
+MAX_PIECES = 300_000  # maximum straight pieces of walls; a scanned hall has some thousands
 LARGEST = 5e3  # side of a map [m]
 FARTHEST = 1e7  # maximum distance of a map from its origin; UTM coordinates are below [m]
 
@@ -149,15 +151,24 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
 
     Returns:
         Segments x1, y1, x2, y2 `(n, 4)` [m].
+
+    Raises:
+        ConfigError: the border is as long as that of noise.
     """
     inside = np.pad(free, 1)
     rows, left, right = _runs(inside[1:, 1:-1] != inside[:-1, 1:-1])
     columns, low, high = _runs((inside[1:-1, 1:] != inside[1:-1, :-1]).T)
+    pieces = len(rows) + len(columns)
+    if pieces > MAX_PIECES:
+        raise ConfigError(
+            f"has walls of {pieces:,} straight pieces, as noise has; at most {MAX_PIECES:,} are read"
+        )
     starts = grid.to_xy(np.r_[rows, low], np.r_[left, columns])
     ends = grid.to_xy(np.r_[rows, high], np.r_[right, columns])
     edges = shapely.multilinestrings(np.round(np.stack([starts, ends], axis=1), 6))
-    lines = shapely.simplify(shapely.line_merge(edges), 1.001 * grid.resolution)
-    return segments(lines)
+    # Each line alone: together, the time grows with the square of their number.
+    lines = shapely.get_parts(shapely.line_merge(edges))
+    return segments(shapely.simplify(lines, 1.001 * grid.resolution))
 
 
 def segments(geometry: Any) -> NDArray[np.float64]:

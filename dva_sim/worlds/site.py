@@ -351,7 +351,10 @@ def _bare_map(path: Path) -> Site:
     reached = grid.reachable(FOOTPRINT)
     if not reached.any():
         raise ConfigError(f"has no known-free floor that a robot of {FOOTPRINT:g} m fits on", path)
-    walls = outline(grid, grid.floor(FOOTPRINT))
+    try:
+        walls = outline(grid, grid.floor(FOOTPRINT))
+    except ConfigError as error:
+        raise ConfigError(error.problem, path) from None
     xy = walls.reshape(-1, 2)
     return Site(
         name=path.stem,

@@ -8,6 +8,7 @@ from helpers.paths import TESTS
 from helpers.worlds.small_map import write_map
 from PIL import Image
 
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import with_named_files
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
@@ -133,6 +134,13 @@ def test_a_rectangle_has_an_outline_of_four_segments():
     walls = outline(grid, cells == FREE)
     assert len(walls) <= 5  # a ring may start within a side
     assert np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum() == pytest.approx(1.8)
+
+
+def test_a_map_of_noise_is_refused(tmp_path):
+    shades = np.where(np.random.default_rng(1).random((1200, 1200)) < 0.9, 254, 0)
+    path = write_map(tmp_path, shades, resolution=0.5)
+    with pytest.raises(ConfigError, match=r"map.yaml:.*walls of 4\d\d,\d\d\d straight pieces"):
+        map_site(path, 1, 1, 1)
 
 
 def test_places_on_a_bare_map_depend_on_the_seed_and_not_on_the_size_of_the_team(tmp_path):
