@@ -179,6 +179,8 @@ class RosPeer:
     def _call(self, operation: Json) -> None:
         service = name_in(operation, "service")
         number = operation.get("id")
+        if number is not None and not is_finite(number):
+            name_in(operation, "id")
 
         def answer(ok: bool, values: Any) -> None:
             reply = {"op": "service_response", "service": service, "values": values, "result": ok}

@@ -128,6 +128,16 @@ def test_a_damaged_operation_is_done_or_refused_in_one_line(operation):
         assert "\n" not in str(entry.get("msg", ""))
 
 
+@pytest.mark.parametrize("id_text", ["NaN", "1e999", "[[]]", "{}", '"' + "x" * 300 + '"', "true"])
+def test_a_call_whose_id_is_none_is_refused(id_text):
+    connection = Deaf()
+    text = f'{{"op": "call_service", "service": "/a", "id": {id_text}}}'
+    RosPeer("a client", connection, Host()).take(text.encode())
+    assert [entry["msg"] for entry in connection.sent] == [
+        "call_service has no id, or a longer one than 256"
+    ]
+
+
 @given(st.binary(max_size=60))
 def test_bytes_that_are_nothing_are_refused(data):
     connection = Deaf()
