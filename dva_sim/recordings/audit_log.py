@@ -254,7 +254,7 @@ def read_rows(path: Path, after: int = 0, most: int = -1) -> list[AuditRow]:
                 f"{_SELECT} WHERE number > ? ORDER BY number LIMIT ?", (after, most)
             )
             return [_row(values) for values in rows]
-        except (sqlite3.Error, ValueError, TypeError) as error:
+        except (sqlite3.Error, ValueError, TypeError, RecursionError) as error:
             raise ConfigError(f"cannot be read as an audit log: {error}", path) from None
 
 
@@ -363,7 +363,39 @@ def _holds_nothing(path: Path) -> bool:
 
 def _row(values: Sequence[Any]) -> AuditRow:
     named = dict(zip(COLUMNS, values, strict=True))
-    return AuditRow(**named | {"details": json.loads(named["details"])})
+    return row_in(named | {"details": json.loads(named["details"])})
+
+
+def row_in(plain: Mapping[str, Any]) -> AuditRow:
+    """Return the row that was stored as a dictionary; its hash is not looked at.
+
+    Raises:
+        TypeError: a column is missing or unknown, or `plain` is no dictionary.
+        ValueError: a column holds what no log writes there.
+    """
+    row = AuditRow(**plain)
+    for name in COLUMNS:
+        value = getattr(row, name)
+        if type(value) not in _TYPES.get(name, (str,)) or _is_no_json(value):
+            raise ValueError(f"{name} of a row is {str(value)[:40]!r}")
+    return row
+
+
+_TYPES: Final[Mapping[str, tuple[type, ...]]] = {
+    "number": (int,),
+    "time_s": (float, int),
+    "event": (int, type(None)),
+    "details": (dict,),
+}
+
+
+def _is_no_json(value: Any) -> bool:
+    """Return True for numbers that are not finite, and all that holds one."""
+    try:
+        json.dumps(value, allow_nan=False)
+    except ValueError:
+        return True
+    return False
 
 
 def plain_row(row: AuditRow) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Applied, DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels, messages, writing
+from dva_sim.recordings.audit_log import plain_row, row_in
 from dva_sim.recordings.raw_records import DamagedError, RawRecords, is_camera
 from dva_sim.recordings.writing import (
     FORMAT,
@@ -234,7 +235,7 @@ def _opened(raw: RawRecords) -> Opened:
         for topic, item in raw.contents.items()
         if topic.startswith(channels.DECISIONS)
     }
-    audit = [json.loads(entry["row"]) for _, entry in raw.contents.get(channels.AUDIT, ())]
+    rows = [json.loads(entry["row"]) for _, entry in raw.contents.get(channels.AUDIT, ())]
     terms = None
     if writing.HELD_TO in run:
         terms = terms_of(scenario, run[writing.HELD_TO])
@@ -245,7 +246,7 @@ def _opened(raw: RawRecords) -> Opened:
         tables=tables,
         lasted=run["duration_s"],
         traces=traces,
-        audit=audit,
+        audit=[plain_row(row_in(row)) for row in rows],
         terms=terms,
         left_out=Counter(raw.written) - raw.found,
         is_counted=bool(raw.written),

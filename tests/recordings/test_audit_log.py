@@ -227,6 +227,24 @@ def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log
         assert place_of(verify_plain(rows), words) == (number, True)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        "time_s='soon'",
+        "time_s=9e999",
+        "text=x'00'",
+        "event=1.5",
+        "details='[]'",
+        "details='{\"waited_s\": NaN}'",
+        f"details='{'[' * 9000}'",
+    ],
+)
+def test_rows_that_no_log_writes_are_not_shown(log, change):
+    by_hand(log, f"UPDATE audit SET {change} WHERE number=2")
+    with pytest.raises(ConfigError, match="cannot be read as an audit log"):
+        read_rows(log)
+
+
 def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path):
     path = tmp_path / "audit.sqlite"
     path.write_text("notes")

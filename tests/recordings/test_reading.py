@@ -32,6 +32,15 @@ def test_the_same_seed_makes_the_same_bytes(folder, tmp_path):
     assert (tmp_path / "again.mcap").read_bytes() == (folder / "drive.mcap").read_bytes()
 
 
+@pytest.mark.parametrize("row", [{"number": 1}, {"more": 1}, [], {"time_s": "soon"}])
+def test_rows_of_an_audit_log_that_no_log_writes_are_refused(folder, tmp_path, row):
+    run = run_of("drive-to-event", 30)
+    path = tmp_path / "run.mcap"
+    write_recording(run, path, audit=[(1.0, row)])
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_recording(path)
+
+
 def test_another_reader_finds_everything_in_virtual_time(folder):
     with (folder / "drill.mcap").open("rb") as file:
         reader = make_reader(file, validate_crcs=True)

@@ -5,6 +5,7 @@ Each figure is made of rows alone, so that an exported log gives the same.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from statistics import median
 from typing import Any
@@ -83,5 +84,5 @@ def _override(row: AuditRow) -> Override:
 
 
 def _number(value: Any) -> float | None:
-    is_one = isinstance(value, int | float) and not isinstance(value, bool)
+    is_one = type(value) in (int, float) and abs(value) <= sys.float_info.max
     return float(value) if is_one else None
