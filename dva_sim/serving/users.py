@@ -24,6 +24,10 @@ MAX_LETTERS: Final = 200  # maximum characters of a password, as hashing takes t
 MAX_USERS: Final = 1000
 MAX_BYTES: Final = 1 << 20
 _NAME: Final = re.compile(r"\w[\w .-]{0,39}")
+# An attempt to log in takes the memory and the time that the hash asks for.
+_HASH: Final = re.compile(
+    r"\$argon2id\$v=19\$m=\d{1,6},t=\d,p=\d{1,2}\$[\w+/]{11,64}\$[\w+/]{16,128}", re.ASCII
+)
 
 
 @dataclass(frozen=True)
@@ -192,6 +196,8 @@ def _user(entry: object, path: Path) -> User:
         name, role, password = (entry.get(key) for key in ("name", "role", "password"))
         locked = entry.get("locked", False)
         is_named = isinstance(name, str) and _NAME.fullmatch(name) is not None
-        if is_named and role in ROLES and isinstance(password, str) and isinstance(locked, bool):
-            return User(str(name), str(role), password, locked)
-    raise ConfigError("is no file of users: an entry should have name, role and password", path)
+        is_hash = isinstance(password, str) and _HASH.fullmatch(password) is not None
+        if is_named and role in ROLES and is_hash and isinstance(locked, bool):
+            return User(str(name), str(role), str(password), locked)
+    problem = "an entry should have name, role, and password as the hash that we made"
+    raise ConfigError(f"is no file of users: {problem}", path)

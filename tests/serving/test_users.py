@@ -45,7 +45,8 @@ def test_a_user_is_changed_locked_and_removed(users):
     assert UserFile(users.path).users == {}
 
 
-ENTRY = {"name": "bo", "role": "look", "password": "x"}
+HASH = "$argon2id$v=19$m=65536,t=3,p=4$jdlNni01KYGLybqoucCjCQ$CwjhY/taxjJLGiTf9xCvTjKSgtipxeFTwAwG"
+ENTRY = {"name": "bo", "role": "look", "password": HASH}
 
 
 def entries(*some):
@@ -75,6 +76,9 @@ MISTAKES = [
         (entries(ENTRY | {"role": "king"}), "entry role"),
         (entries(ENTRY | {"more": 1}), "entry"),
         (entries(ENTRY | {"password": None}), "entry password"),
+        (entries(ENTRY | {"password": "plain"}), "entry password hash"),
+        (entries(ENTRY | {"password": HASH.replace("65536", "4294967295")}), "entry password hash"),
+        (entries(ENTRY | {"password": HASH.replace("t=3", "t=4000")}), "entry password hash"),
         (entries(ENTRY, ENTRY), "two same name"),
         (" " * (MAX_BYTES + 1), "too long"),
     ),
