@@ -1,4 +1,4 @@
-"""Cells of CSV tables, protected from being taken for formulas by spreadsheets."""
+"""Cells of CSV tables, in which nothing acts: no formula, and no character that hides or turns."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import re
 from collections.abc import Iterable
 from typing import Any, Final
 
+from dva_sim.kernel.labels import HIDDEN
+
 ACTS: Final = r"^[=+\-@\t\r]"  # first characters that make a cell a formula
+HIDES: Final = "[" + "".join(map(chr, sorted(HIDDEN)[1:])) + "]"  # but for NUL, which ends SQL
+SHOWN: Final = "\ufffd"  # in the place of each character that hides
 
 
 def harmless(cell: Any) -> Any:
     """Return a cell, with an apostrophe before text that would act as a formula."""
-    return f"'{cell}" if isinstance(cell, str) and re.match(ACTS, cell) else cell
+    if not isinstance(cell, str):
+        return cell
+    text = re.sub(HIDES, SHOWN, cell.replace("\0", SHOWN))
+    return f"'{text}" if re.match(ACTS, text) else text
 
 
 def harmless_row(cells: Iterable[Any]) -> list[Any]:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from dva_sim.experiments.results.results import Results, escaped, quoted
-from dva_sim.kernel.csv_cells import ACTS, harmless, harmless_row
+from dva_sim.kernel.csv_cells import ACTS, HIDES, SHOWN, harmless, harmless_row
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.kernel.suggestions import either
@@ -89,7 +89,11 @@ def _writer(results: Results, table: str, form: str) -> _Write:
 # How a cell is written, by the type of its column; no text acts in a spreadsheet.
 _CELLS = {
     "DOUBLE": "nullif({0}, 'nan')",
-    "VARCHAR": "CASE WHEN regexp_matches({0}, '" + ACTS + "') THEN '''' || {0} ELSE {0} END",
+    "VARCHAR": "regexp_replace(CASE WHEN regexp_matches({0}, '"
+    + ACTS
+    + "') THEN '''' || {0} ELSE {0} END, '"
+    + HIDES
+    + f"', '{SHOWN}', 'g')",
 }
 
 

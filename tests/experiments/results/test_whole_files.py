@@ -69,14 +69,18 @@ def test_other_cells_are_as_they_are(cell):
     assert harmless(cell) == cell
 
 
+def test_characters_that_hide_or_turn_text_are_shown_in_a_cell():
+    assert harmless("a\u202eb\x07\0c\nd") == "a\ufffdb\ufffd\ufffdc\nd"
+
+
 def test_levels_that_look_like_formulas_are_exported_harmless(tmp_path):
     def noted(job):
         tables = kit.cheap(job)
-        return tables | {"runs": [tables["runs"][0] | {"note": "=HYPERLINK(1)", "kind": -5}]}
+        return tables | {"runs": [tables["runs"][0] | {"note": "=HYPERLINK(1)\u202e", "kind": -5}]}
 
     out = tmp_path / "out"
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=noted)
     assert call("export", out, "--table", "runs", "-o", tmp_path / "runs.csv").returncode == 0
     with (tmp_path / "runs.csv").open(newline="") as file:
         row = next(csv.DictReader(file))
-    assert (row["note"], row["kind"]) == ("'=HYPERLINK(1)", "-5")
+    assert (row["note"], row["kind"]) == ("'=HYPERLINK(1)\ufffd", "-5")
