@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -74,14 +74,17 @@ def _film_under_way(path: Path) -> Iterator[None]:
         yield
         return
     part = path.with_name(f".{path.name}")  # half a film would pass for a whole one
-    with closing(WorkerProcess()) as maker:
-        teller = threading.Thread(target=_say_when_done, args=(maker, part, path), daemon=True)
+    # The other one waits, in case that the first is killed.
+    with closing(WorkerProcess()) as maker, closing(WorkerProcess()) as other:
+        makers = maker, other
+        teller = threading.Thread(target=_say_when_done, args=(makers, part, path), daemon=True)
         teller.start()
         try:
             yield
             teller.join(_PATIENCE_S)
         finally:
-            maker.kill()
+            for each in makers:
+                each.kill()
             teller.join()
             part.unlink(missing_ok=True)
 
@@ -99,10 +102,13 @@ def _make_film(path: Path) -> str:
     return ""
 
 
-def _say_when_done(maker: WorkerProcess, part: Path, path: Path) -> None:
-    with suppress(WorkerDied):
-        if problem := maker.call(partial(_make_film, part)):
-            say(f"No film: {problem}")
+def _say_when_done(makers: Sequence[WorkerProcess], part: Path, path: Path) -> None:
+    for maker in makers:
+        with suppress(WorkerDied):
+            if problem := maker.call(partial(_make_film, part)):
+                say(f"No film: {problem}")
+                return
+            part.replace(path)
+            say(f"Film: {path}")
             return
-        part.replace(path)
-        say(f"Film: {path}")
+    say("No film: its process has ended; run the same command again")

@@ -1,5 +1,7 @@
 """The first minute: a picture and a story first, then a study, and a film beside it."""
 
+import os
+import signal
 import time
 
 import pytest
@@ -56,13 +58,41 @@ def test_a_film_that_is_still_being_made_ends_with_the_demo(tmp_path, monkeypatc
     monkeypatch.setattr(module, "_make_film", half_of_it)
     with pytest.raises(KeyboardInterrupt):
         stop()
-    assert makers[0]._process.returncode is not None
+    assert all(maker._process.returncode is not None for maker in makers)
     assert list(tmp_path.iterdir()) == []
 
 
 def half_of_it(path):
     path.write_text("half")
     time.sleep(600)
+
+
+def test_a_second_process_makes_the_film_if_the_first_is_killed(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "_make_film", killed_once)
+    with module._film_under_way(tmp_path / FILM):
+        pass
+    assert (tmp_path / FILM).read_text() == "whole"
+    assert "No film" not in capsys.readouterr().out
+
+
+def killed_once(path):
+    if not path.exists():
+        path.write_text("half")
+        os.kill(os.getpid(), signal.SIGKILL)
+    path.write_text("whole")
+    return ""
+
+
+def test_a_film_that_nobody_made_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(module, "_make_film", killed)
+    with module._film_under_way(tmp_path / FILM):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    assert "No film: its process has ended" in capsys.readouterr().out
+
+
+def killed(path):
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_half_a_film_does_not_pass_for_one(tmp_path, monkeypatch, capsys):
