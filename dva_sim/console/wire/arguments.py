@@ -398,7 +398,7 @@ class PagesHere(TypedDict):
     `users` are the names of those who have logged in, by client.
     """
 
-    pages: dict[str, str]
+    pages: dict[str, Literal["", "drive", "dispatch", "supervise"]]
     users: NotRequired[dict[str, str]]
 
 
