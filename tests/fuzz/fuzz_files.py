@@ -4,8 +4,8 @@
     python tests/fuzz/fuzz_files.py --only manifest --count 200     # one reader
 
 Each mutant is read in a process of its own, which is a copy of one that has loaded all modules;
-what is valid is then used. Limits: 5 s of processor, 500 MB, one line of ours and its exit code,
-nothing beside its folder, and nothing active in what is printed or written.
+what is valid is then used. Limits: 5 s of processor or sleep, 500 MB, one line of ours and its exit
+code, nothing beside its folder, and nothing active in what is printed or written.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fuzz import mutations
 from fuzz.readers import Reader, readers
 
+MOST_LETTERS = 600  # of a line for people
 MOST_CPU_S, MOST_WALL_S, MOST_MB = 5, 60, 500
 OWN_MB = 250  # of it for the mutant: a process that has run much before begins with more
 CONTROLS = {chr(n) for n in (*range(9), 11, 12, *range(14, 32), 127)}
@@ -78,10 +79,12 @@ def use(mutant: Mutant, folder: Path) -> str:
     reader = mutant.reader
     if reader.read is not None:
         try:
-            reader.read(mutant.data)
+            said = str(reader.read(mutant.data) or "")
         except reader.refuses as error:
-            return _active(str(error))
-        return ""
+            said = str(error)
+            if len(said) > MOST_LETTERS or "\n" in said:
+                return f"refuses with {len(said)} characters: {said[:200]!r}"
+        return _active(said)
     place = folder / "place"
     shutil.copytree(mutant.sample.parent, place)
     file = place / mutant.sample.name
@@ -97,6 +100,8 @@ def use(mutant: Mutant, folder: Path) -> str:
             return f"{words}: exit code {code} without a line of ours"
         if "Traceback" in said or "Warning" in said or said.count("error: ") > 1:
             return f"{words}: says {said[-600:]!r}"
+        if longest := max((line for line in said.split("\n")), key=len)[MOST_LETTERS:]:
+            return f"{words}: says a line of {len(longest)} letters more than one can read"
         if problem := _active(out.getvalue() + said):
             return f"{words}: prints {problem}"
         if code:
@@ -117,7 +122,7 @@ def _active_in(path: Path) -> str:
     text = path.read_text(errors="replace")
     if path.suffix == ".csv":
         cells = [cell.lstrip('"') for line in text.split("\n") for cell in line.split(",")]
-        return "a formula" if any(cell.startswith("=HYPERLINK") for cell in cells) else ""
+        return "a formula" if any(c.startswith("=HYPERLINK") for c in cells) else _active(text)
     return "active markup" if mutations.MARKUP in text else _active(text)
 
 
@@ -158,7 +163,26 @@ def _waited(child: int) -> tuple[int, resource.struct_rusage]:
     return os.wait4(child, 0)[1:]
 
 
+class SleepsTooLong(BaseException):
+    """A reader that keeps its user waiting without working."""
+
+
+def _limit_sleep() -> None:
+    """Let those who sleep for longer than is allowed, all in all, fail at once."""
+    sleep, slept = time.sleep, 0.0
+
+    def sleep_for(seconds: float) -> None:
+        nonlocal slept
+        slept += seconds
+        if slept > MOST_CPU_S:
+            raise SleepsTooLong(f"sleeps for more than {MOST_CPU_S} s")
+        sleep(seconds)
+
+    time.sleep = sleep_for
+
+
 def _in_child(mutant: Mutant, folder: Path, pipe: int) -> None:
+    _limit_sleep()
     try:
         resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_S, MOST_CPU_S + 1))
         said = use(mutant, folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import re
 import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
@@ -23,6 +24,9 @@ TEXTS = (
     "",
     " ",
     "a" * 5000,
+    "a" * 1_000_000,
+    "\ud800",  # half a character
+    "[" * 20_000,
     "../../x",
     "\x1b[31m",
     "a\nb",
@@ -34,7 +38,7 @@ NUMBERS = (
     *(math.inf, -math.inf, math.nan),
 )
 OTHERS = (None, True, [], {}, [[]], {"": None})
-DEPTH = 3000
+DEPTH = 10_000
 
 Mutation = Callable[[bytes, Random], bytes]
 
@@ -71,11 +75,21 @@ def tree(data: Any, rng: Random) -> Any:
             del holder[path[-1]]
         elif kind == 1 and isinstance(holder, dict):
             holder[rng.choice([*TEXTS[:4], f"{path[-1]}x"])] = holder.pop(path[-1])
+        elif kind == 3 and isinstance(holder[path[-1]], str):
+            numbers = map(str, (rng.choice(NUMBERS), 2**32 - 1))
+            holder[path[-1]] = within(holder[path[-1]], rng, "\\d+", rng.choice([*numbers]))
         elif kind == 2 and isinstance(holder, list):
             holder += holder[: 1000 // (len(holder) or 1)]
         else:
             holder[path[-1]] = a_value(rng, holder[path[-1]])
     return data
+
+
+def within(text: str, rng: Random, pattern: str, new: str) -> str:
+    """Put something in the place of one of the parts of a text that have a form."""
+    spans = [found.span() for found in re.finditer(pattern, text)]
+    start, end = rng.choice(spans or [(len(text), len(text))])
+    return text[:start] + new + text[end:]
 
 
 def raw(data: bytes, rng: Random) -> bytes:
@@ -99,8 +113,14 @@ def of_json(data: bytes, rng: Random) -> bytes:
     if rng.random() < 0.1:
         return raw(data, rng)
     text = json.dumps(tree(json.loads(data), rng))
-    if rng.random() < 0.05:
-        text = text.replace("null", "[" * DEPTH + "]" * DEPTH, 1)
+    kind = rng.random()
+    if kind < 0.05:
+        deep = "[" * DEPTH + "]" * DEPTH
+        deep = rng.choice([deep, '{"a":' * DEPTH + "1" + "}" * DEPTH])
+        text = within(text, rng, r"\bnull\b|\btrue\b|\b\d+\b|\"[^\"]*\"(?!:)", deep)
+    elif kind < 0.1:  # a key that is there twice
+        again = json.dumps(a_value(rng, 1))
+        text = re.sub(r'("[^"]*"): ', lambda key: f"{key[0]}{again}, {key[0]}", text, count=1)
     return text.encode()
 
 
@@ -122,14 +142,16 @@ def of_lines(data: bytes, rng: Random) -> bytes:
     sign = next((sign for sign in (",", "=", " ") if sign in lines[at]), " ")
     cells = lines[at].split(sign)
     cells[rng.randrange(len(cells))] = str(rng.choice([*NUMBERS, *TEXTS]))
-    return "\n".join([*lines[:at], sign.join(cells), *lines[at + 1 :]]).encode()
+    text = "\n".join([*lines[:at], sign.join(cells), *lines[at + 1 :]])
+    return text.encode("utf-8", "surrogatepass")
 
 
-def of_jsonl(data: bytes, rng: Random) -> bytes:
-    """Damage one line of JSON among others."""
+def of_jsonl(data: bytes, rng: Random, most: int = 12) -> bytes:
+    """Draw some lines of JSON, and damage half of them."""
     lines = data.splitlines()
     at = rng.randrange(len(lines))
-    return b"\n".join([*lines[:at], of_json(lines[at], rng), *lines[at + 1 :]]) + b"\n"
+    drawn = (lines[at:] + lines[:at])[: rng.randrange(1, most)]
+    return b"\n".join(of_json(line, rng) if rng.random() < 0.5 else line for line in drawn)
 
 
 def of_sqlite(data: bytes, rng: Random) -> bytes:
@@ -159,9 +181,21 @@ def of_sqlite(data: bytes, rng: Random) -> bytes:
             try:
                 where = f'UPDATE "{table}" SET "{names[at]}" = ? WHERE rowid = ?'
                 db.execute(where, [new, number])
-            except (sqlite3.Error, OverflowError):
+            except (sqlite3.Error, OverflowError, UnicodeEncodeError):
                 db.execute(f'DELETE FROM "{table}" WHERE rowid = ?', [number])
         return Path(file.name).read_bytes()
+
+
+def of_image(data: bytes, rng: Random) -> bytes:
+    """Damage the bytes of an image, or draw noise in shades of grey instead."""
+    if rng.random() < 0.5:
+        return raw(data, rng)
+    import numpy as np
+
+    width, height = (rng.choice([1, 60, 400, 900, 2000]) for _ in range(2))
+    is_free = np.random.default_rng(rng.randrange(2**32)).random((height, width)) < rng.random()
+    head = rng.choice([b"P5 %d %d 255\n", b"P5 %d0 %d 255\n", b"P5 %d %d00000 255\n"])
+    return head % (width, height) + np.where(is_free, 254, 0).astype(np.uint8).tobytes()
 
 
 def of_mcap(data: bytes, rng: Random) -> bytes:

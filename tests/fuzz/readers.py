@@ -13,6 +13,7 @@ from pathlib import Path
 from random import Random
 
 from fuzz import mutations as m
+from helpers.messages.damaged_messages import mutated
 from helpers.paths import ROOT, TESTS
 
 Samples = Callable[[Path], Sequence[Path]]
@@ -119,11 +120,6 @@ DELAYS = {
     ),
 }
 SMALL_SCENARIO = {"small.yaml": "description: one robot\nhorizon_s: 20\nevents: []\n"}
-LINES = {
-    "rosbridge.json": '{"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.1}}, '
-    '"id": "a", "throttle_rate": 5, "queue_length": 1}',
-    "web.json": '{"id": "a1", "do": "emergency", "robots": "all", "speed_mps": 0.3}',
-}
 
 
 PLUG_IN = """\
@@ -154,88 +150,26 @@ def users(folder: Path) -> list[Path]:
     return [folder / "users.json"]
 
 
-def audit(folder: Path) -> list[Path]:
-    from dva_sim.recordings.audit_log import AuditEntry, AuditLog
-
-    folder.mkdir(parents=True)
-    log = AuditLog(folder / "audit.sqlite")
-    entry = {"time_s": 12.5, "at_utc": "2026-01-01T00:00:00Z", "author": "ana"}
-    log.append([AuditEntry(**entry, action=action) for action in ("acknowledge", "assign")])
-    log.close()
-    return [folder / "audit.sqlite"]
-
-
-def state(folder: Path) -> list[Path]:
-    from dva_sim.core.store import Store
-
-    folder.mkdir(parents=True)
-    Store(folder / "dva.state").close()
-    return [folder / "dva.state"]
-
-
-def read_state(data: bytes) -> None:
-    """Open the memory of a DVA."""
-    import tempfile
-
-    from dva_sim.core.store import Store
-
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "dva.state")
-        file.write_bytes(data)
-        Store(file).close()
-
-
-def keys(folder: Path) -> list[Path]:
-    from dva_sim.network.keys import create_keys
-
-    create_keys(folder, ["02:00:00:00:00:01"])
-    return sorted(path for path in folder.rglob("*") if path.is_file())
-
-
-def read_key(data: bytes) -> None:
-    """Read a key as a public and as a secret one."""
-    import tempfile
-
-    from dva_sim.network.keys import KeyRing
-
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("public", "secret"):
-            Path(folder, name).mkdir(mode=0o700)
-            Path(folder, name, "02-00-00-00-00-01.key").write_bytes(data)
-        KeyRing(folder).pair("02:00:00:00:00:01")
-
-
-def read_rosbridge(data: bytes) -> None:
-    from dva_sim.ros import rosbridge
-
-    operation = rosbridge.decode(data)
-    for name in ("op", "topic"):
-        rosbridge.name_in(operation, name)
-    rosbridge.number_in(operation, "throttle_rate", 1e6)
-
-
-def read_web(data: bytes) -> None:
-    from dva_sim.console.web import actions
-
-    actions.read(data)
-
-
 def readers() -> list[Reader]:
     """Return the table."""
-    from dva_sim.console.wire.kinds import BadMessage
-    from dva_sim.kernel.errors import DvaSimError
-    from dva_sim.ros.rosbridge import BadOperation
+    from fuzz import doors
 
+    from dva_sim.kernel.errors import DvaSimError
+
+    refuses = (DvaSimError,)
+    samples = partial(copies, "protocol/samples/valid/*.xml")
     check = ("check {}",)
     table = ("check {}", "show {folder}", "report {folder}", "export {folder} -o {folder}/x.csv")
     hall = partial(beside, "tests/data/hall.yaml", "tests/data/hall.png")
+    image = partial(beside, "tests/data/hall.png", "tests/data/hall.yaml")
     campus = partial(beside, "worlds/campus.yaml", "worlds/*.geojson")
     plan = partial(beside, "worlds/caparica.geojson", "worlds/caparica.yaml")
     record = partial(made, "run.mcap", "episode drive-to-event --record {}")
     policies = partial(texts, {"mine.py": PLUG_IN})
     return [
         Reader("plug-in", policies, plug_in, ("check policy {}:Mine",), weight=2),
-        Reader("message", partial(copies, "protocol/samples/valid/*.xml"), m.raw, check, weight=30),
+        Reader("message", samples, mutated, check, weight=30),
+        Reader("message heard", doors.messages, mutated, (), doors.read_message, weight=6),
         Reader("study", partial(copies, "experiments/k*.yaml"), m.of_yaml, check, weight=4),
         Reader(
             "scenario",
@@ -247,6 +181,7 @@ def readers() -> list[Reader]:
         Reader("site", campus, m.of_yaml, ("check {}", "site show {}"), weight=4),
         Reader("plan", plan, m.of_json, ("check {}", "site show {folder}/caparica.yaml"), weight=4),
         Reader("map", hall, m.of_yaml, ("site show {}",), weight=6),
+        Reader("image", image, m.of_image, ("site show {folder}/hall.yaml",), weight=6),
         Reader("trace", partial(copies, "experiments/traces/*"), m.of_lines, check),
         Reader("delay log", partial(texts, DELAYS), m.of_lines, check, weight=30),
         Reader("phone log", partial(texts, LOGS), m.of_lines, ("phone-log {}",), weight=30),
@@ -257,22 +192,14 @@ def readers() -> list[Reader]:
         Reader(
             "registration", partial(copies, "experiments/*.registration.yaml"), m.of_yaml, check
         ),
-        Reader("audit log", audit, m.of_sqlite, check),
+        Reader("audit log", doors.audit, m.of_sqlite, check),
+        Reader("audit pages", doors.audit, m.of_sqlite, (), doors.read_audit, refuses),
         Reader("users", users, m.of_json, ("users list --file {}",)),
-        Reader("state", state, m.of_sqlite, read=read_state, refuses=(DvaSimError,)),
-        Reader("keys", keys, m.of_lines, read=read_key, refuses=(DvaSimError,)),
-        Reader(
-            "rosbridge",
-            partial(texts, {"a.json": LINES["rosbridge.json"]}),
-            m.of_json,
-            read=read_rosbridge,
-            refuses=(BadOperation,),
-        ),
-        Reader(
-            "web",
-            partial(texts, {"a.json": LINES["web.json"]}),
-            m.of_json,
-            read=read_web,
-            refuses=(BadMessage,),
-        ),
+        Reader("logins", users, m.of_json, (), doors.read_users, refuses, weight=4),
+        Reader("state", doors.state, m.of_sqlite, (), doors.open_state, refuses),
+        Reader("recalled state", doors.state, m.of_sqlite, (), doors.read_state, refuses),
+        Reader("keys", doors.keys, m.of_lines, (), doors.read_key, refuses),
+        Reader("rosbridge", doors.rosbridge, m.of_jsonl, (), doors.read_rosbridge, weight=4),
+        Reader("bridge", doors.bridged, m.of_jsonl, (), doors.read_bridge),
+        Reader("web", doors.web, m.of_jsonl, (), doors.read_web, weight=4),
     ]
