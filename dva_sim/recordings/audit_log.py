@@ -370,13 +370,13 @@ def row_in(plain: Mapping[str, Any]) -> AuditRow:
     """Return the row that was stored as a dictionary; its hash is not looked at.
 
     Raises:
-        TypeError: a column is missing or unknown, or `plain` is no dictionary.
+        TypeError: a column is missing or unknown.
         ValueError: a column holds what no log writes there.
     """
     row = AuditRow(**plain)
     for name in COLUMNS:
         value = getattr(row, name)
-        if type(value) not in _TYPES.get(name, (str,)) or _is_no_json(value):
+        if type(value) not in _TYPES.get(name, (str,)) or not _is_finite(value):
             raise ValueError(f"{name} of a row is {str(value)[:40]!r}")
     return row
 
@@ -389,13 +389,13 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
 }
 
 
-def _is_no_json(value: Any) -> bool:
-    """Return True for numbers that are not finite, and all that holds one."""
+def _is_finite(value: Any) -> bool:
+    """Return True if all numbers in a value are finite."""
     try:
         json.dumps(value, allow_nan=False)
     except ValueError:
-        return True
-    return False
+        return False
+    return True
 
 
 def plain_row(row: AuditRow) -> dict[str, Any]:

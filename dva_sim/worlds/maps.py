@@ -161,7 +161,7 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
     pieces = len(rows) + len(columns)
     if pieces > MAX_PIECES:
         raise ConfigError(
-            f"has walls of {pieces:,} straight pieces, as noise has; at most {MAX_PIECES:,} are read"
+            f"has walls of {pieces:,} straight pieces, like noise; at most {MAX_PIECES:,} are read"
         )
     starts = grid.to_xy(np.r_[rows, low], np.r_[left, columns])
     ends = grid.to_xy(np.r_[rows, high], np.r_[right, columns])

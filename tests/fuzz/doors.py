@@ -51,7 +51,7 @@ STEP_S = 0.3  # of the run, from one line to the next
 
 
 class Unanswered(Exception):
-    """What is asked after a mutant has no answer, or a wrong one."""
+    """A question after a mutant that has no answer, or a wrong one."""
 
 
 # --- web lines ----------------------------------------------------------------------------
