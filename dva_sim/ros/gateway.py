@@ -194,14 +194,19 @@ class RosDriver:
         self._person.release(lambda *_: None)
 
     def drive(self, robot: str, speed: float, turn_rate: float) -> str:
-        """Command a speed [m/s] and a turn rate [rad/s]; return why not, or an empty text."""
+        """Command a speed [m/s] and a turn rate [rad/s]; return why not, or an empty text.
+
+        What is beyond the robot's reach counts as the reach.
+        """
         control = self._person.robots.get(robot)
         if control is None or not control.is_driven:
             why = self._person.alert
             return f"it is not yours{f' ({why})' if why else ''}: call take_control first"
         reach = self._person.console.reach(robot)
         self._number += 1
-        control.want(self._number, max(0.0, speed) / reach.speed, turn_rate / reach.turn_rate)
+        turn = turn_rate / reach.turn_rate
+        speed_share = min(max(0.0, speed) / reach.speed, 1.0)
+        control.want(self._number, speed_share, min(max(turn, -1.0), 1.0))
         self._newest[robot] = self._number
         self.device.clock.call_after(SILENT, self._fell_silent, robot, self._number)
         return ""

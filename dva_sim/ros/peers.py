@@ -169,12 +169,12 @@ class RosPeer:
             speed = twist["linear"]["x"]
             turn_rate = twist["angular"]["z"]
         except (TypeError, KeyError):
-            raise BadOperation(f"{topic}: no Twist with linear.x and angular.z") from None
+            raise BadOperation(f"{topic!r}: no Twist with linear.x and angular.z") from None
         for what, value in (("linear.x", speed), ("angular.z", turn_rate)):
             if not is_finite(value):
-                raise BadOperation(f"{topic}: {what} is {str(value)[:40]}, not a finite number")
+                raise BadOperation(f"{topic!r}: {what} is {str(value)[:40]}, not a finite number")
         if why := self._host.command(self, topic, float(speed), float(turn_rate)):
-            raise BadOperation(f"{topic}: {why}")
+            raise BadOperation(f"{topic!r}: {why}")
 
     def _call(self, operation: Json) -> None:
         service = name_in(operation, "service")

@@ -180,3 +180,11 @@ def test_a_stream_of_pictures_that_is_none_is_read_without_an_error(pieces, leng
 def test_a_place_of_pictures_that_is_none_is_never_looked_for(url, monkeypatch):
     monkeypatch.setattr(mjpeg, "Dialling", None)
     MjpegReader(LiveClock(), url, "secret", lambda *_: None).close()
+
+
+def test_a_topic_of_control_characters_does_not_act_where_the_refusal_is_shown():
+    connection = Deaf()
+    RosPeer("a client", connection, Host()).take(b'{"op": "publish", "topic": "a\\u001b[31m"}')
+    assert [entry["msg"] for entry in connection.sent] == [
+        r"'a\x1b[31m': no Twist with linear.x and angular.z"
+    ]
