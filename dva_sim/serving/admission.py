@@ -1,7 +1,7 @@
-"""Admission of requests: by the name they ask for, the page they come from, and their token.
+"""Admission of requests, by their host name, the page that sent them, and their token.
 
-A name of another site may lead here (DNS rebinding), and a page of another site may ask from a
-browser on this machine. Both are refused before anything else looks at a request.
+The name of another site may resolve to this machine (DNS rebinding), and a page of another site may
+send requests from a browser on this machine. Both are refused before a request is processed.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class RequestFacts:
     Attributes:
         host: The `Host` header.
         origin: The `Origin` header; None if there is none, as outside of browsers.
-        site: The `Sec-Fetch-Site` header: how the asking page and this server are related.
+        site: The `Sec-Fetch-Site` header: relation of the sending page to this server.
         mode: The `Sec-Fetch-Mode` header; `navigate` where a person opens a page.
         scheme: `http` or `https`.
-        changes: True if it is more than reading: a POST or a WebSocket.
-        is_page: True if it asks for something that people open in a browser.
+        changes: True for requests that may change something: a POST or a WebSocket.
+        is_page: True if people open the requested address in a browser.
     """
 
     host: str
@@ -46,14 +46,14 @@ class RequestFacts:
 
 @dataclass(frozen=True)
 class OwnNames:
-    """Names under which a port is served, and the pages that may ask it.
+    """Names under which a port is served, and the pages that may send it requests.
 
-    Attributes:
-        names: In lower case.
-        any_address: True if it is served on all addresses of the machine: then each IP address may
-            be asked for. An address cannot be made to lead elsewhere, as a name can.
-        any_port: True if pages may ask that another port of the same names serves.
-        programs: Origins of programs elsewhere that may ask.
+        Attributes:
+    names: Host names, in lower case.
+            any_address: True if it is served on all addresses of the machine. Then any IP address is
+                accepted as host: unlike a name, an address cannot be rebound to another machine.
+            any_port: True if pages served by another port of the same names are admitted.
+    programs: Origins of web applications elsewhere that are admitted.
     """
 
     names: Collection[str] = LOCAL
@@ -62,15 +62,16 @@ class OwnNames:
     programs: Collection[str] = ()
 
     def refusal(self, facts: RequestFacts) -> tuple[int, str] | None:
-        """Return status and reason for refusing a request with any token; None: it may pass."""
+        """Return the HTTP status and reason of a refusal, whatever the token; None to admit."""
         if not self.is_own(facts.host):
             return 421, "nothing is served here under that name"
         if facts.origin is not None:
-            if not self._may_ask(facts.origin.lower(), facts):
+            if not self._admits(facts.origin.lower(), facts):
                 return 403, "a page of another site may not ask here"
         elif facts.site == "cross-site" or (facts.site == "same-site" and not self.any_port):
-            opened = facts.is_page and facts.mode == "navigate" and not facts.changes
-            if not opened:
+            # Following a link from another site is harmless: it only opens a page.
+            is_link = facts.is_page and facts.mode == "navigate" and not facts.changes
+            if not is_link:
                 return 403, "a page of another site may not ask here"
         return None
 
@@ -81,8 +82,8 @@ class OwnNames:
             return False
         return name in self.names or (self.any_address and is_address(name))
 
-    def _may_ask(self, origin: str, facts: RequestFacts) -> bool:
-        """Return True for pages of the same scheme, name and port, and for those let in besides."""
+    def _admits(self, origin: str, facts: RequestFacts) -> bool:
+        """Return True for pages of the same scheme, name and port, or an admitted origin."""
         if origin == f"{facts.scheme}://{facts.host}".lower() or origin in self.programs:
             return True
         scheme, _, host = origin.partition("://")
@@ -96,18 +97,18 @@ def own_names(
 
     Args:
         host: Host that it listens on, such as `127.0.0.1`, `0.0.0.0` or a name of this machine.
-        names: More names under which it is asked for.
+        names: Further names under which clients reach it.
         any_port: See `OwnNames`.
         programs: See `OwnNames`.
     """
-    names_here = {name.lower().strip("[]") for name in (*names, host)}
+    all_names = {name.lower().strip("[]") for name in (*names, host)}
     everywhere = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_unspecified
     local = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_loopback
     if everywhere or local or host.lower() == "localhost":
-        names_here.update(LOCAL)
+        all_names.update(LOCAL)
     if everywhere:
-        names_here.add(socket.gethostname().lower())
-    return OwnNames(frozenset(names_here), everywhere, any_port, programs)
+        all_names.add(socket.gethostname().lower())
+    return OwnNames(frozenset(all_names), everywhere, any_port, programs)
 
 
 @dataclass(frozen=True)
@@ -123,19 +124,19 @@ class Admission:
     token: str = ""
 
     def refusal(self, facts: RequestFacts, query: str, bearer: str) -> tuple[int, str] | None:
-        """Return status and reason for refusing a request; None: it may pass.
+        """Return the HTTP status and reason of a refusal; None to admit the request.
 
         Args:
             facts: The request.
-            query: Query of its address.
-            bearer: Its `Authorization` header.
+            query: Query string of the request.
+            bearer: `Authorization` header of the request.
         """
         refusal = self.own.refusal(facts)
         if refusal is not None:
             return refusal
         try:
             token = parse_qs(query).get("token", [""])[0]
-        except ValueError:  # more fields than anybody writes
+        except ValueError:  # more fields than the parser allows
             return 400, "the address makes no sense"
         token = token or bearer.removeprefix("Bearer ")
         token_bytes = token.encode("utf-8", "replace")
@@ -146,7 +147,7 @@ class Admission:
 
 
 def name_in(host: str) -> str | None:
-    """Return the name or address in a `Host` header, in lower case; None if it is none."""
+    """Return the name or address in a `Host` header, in lower case; None if it is malformed."""
     match = _HOST.fullmatch(host)
     if match is None:
         return None

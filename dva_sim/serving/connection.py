@@ -16,14 +16,15 @@ from dva_sim.serving.port_connections import PortConnection
 
 WIRE = "dva_sim.wire"
 PLACE = "dva_sim.place"
-NO_LINGERING = struct.pack("ii", 1, 0)  # a reset: the kernel keeps nothing for a deaf client
+NO_LINGERING = struct.pack("ii", 1, 0)  # reset on close: drop unsent data
 
 
 class HttpProtocol(H11Protocol):
-    """An HTTP connection that its port counts, and may cut.
+    """An HTTP connection that its port counts and can cut.
 
-    uvicorn hides the connection from the application, but only there a client that does not read is
-    noticed, and a connection with a token known. So both are handed through a request's scope.
+    uvicorn hides the connection from the application, but only the application notices a client
+    that does not read, and knows who showed a token. So each request's scope holds protocol and
+    slot.
 
     Args:
         slot: Connection slot that the port counts.
@@ -49,37 +50,37 @@ class HttpProtocol(H11Protocol):
         return 0 if self._is_lost else self.transport.get_write_buffer_size()
 
     def take_one_by_one(self) -> None:
-        """Let each piece of a response be taken by the client before the next one is sent."""
+        """Wait until the client has taken each piece of a response before sending the next."""
         if not self._is_lost:
-            self.transport.set_write_buffer_limits(high=1, low=0)  # TLS takes 0 for always full
+            self.transport.set_write_buffer_limits(high=1, low=0)  # 0 would always mean full in TLS
 
     def cut(self) -> None:
-        """End the connection at once, also under a WebSocket; what is on its way is lost."""
+        """End the connection at once, also under a WebSocket; data in transit is lost."""
         if not self._is_lost:
             reset(self.transport)
 
     def send_400_response(self, msg: str) -> None:
-        """Reject input that is not HTTP; if an answer has begun or ended, only close."""
+        """Reject input that is not HTTP; only close if a response has begun or ended."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             super().send_400_response(msg)
         else:
             self.transport.close()
 
     def connection_made(self, transport: Any) -> None:
-        """Let the connection be cut for others."""
+        """Let the port cut the connection to make room for others."""
         super().connection_made(transport)
         self.is_made = True
         self._place.drop = self.cut
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Release the place of the connection."""
+        """Release the connection slot."""
         self._is_lost = True
         super().connection_lost(exc)
         self._place.leave()
 
 
 def reset(transport: Any) -> None:
-    """End a connection at once; what is on its way is lost."""
+    """End a connection at once; data in transit is lost."""
     sock = transport.get_extra_info("socket")
     if sock is not None:
         with suppress(OSError):
@@ -88,7 +89,7 @@ def reset(transport: Any) -> None:
 
 
 def extended(app: Any, more: dict[str, Any]) -> ASGIApp:
-    """Return an application that finds more in the scope of each request."""
+    """Return an application whose requests have more keys in their scope."""
 
     async def with_more(scope: Scope, receive: Receive, send: Send) -> None:
         scope.setdefault("extensions", {}).update(more)
@@ -98,11 +99,11 @@ def extended(app: Any, more: dict[str, Any]) -> ASGIApp:
 
 
 def place_of(scope: Scope) -> PortConnection:
-    """Return the place of the connection under a request."""
+    """Return the slot of the connection that carries a request."""
     slot: PortConnection = scope["extensions"][PLACE]
     return slot
 
 
 def wire_of(scope: Scope) -> Any:
-    """Return the connection under a request: that of the WebSocket, else `HttpProtocol`."""
+    """Return the protocol that carries a request: that of the WebSocket, or `HttpProtocol`."""
     return scope["extensions"][WIRE]

@@ -8,7 +8,7 @@ import socket
 
 from dva_sim.kernel.errors import ConfigError
 
-SEND_BYTES = 64 * 1024  # send buffer of each connection in the kernel: data waiting there gets old
+SEND_BYTES = 64 * 1024  # kernel send buffer of a connection: data in it goes stale
 SILENT_MS = 20_000  # a connection that takes or answers nothing for this long is cut [ms]
 WAITING = 1024  # maximum connections waiting to be accepted
 

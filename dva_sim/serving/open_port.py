@@ -1,4 +1,4 @@
-"""A port for programs of other makes, with its token and the announcement of its address."""
+"""A port for programs of other makers, with its token and its address."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dva_sim.serving.listening import listen
 
 @dataclass(frozen=True)
 class OpenPort:
-    """A port for clients of other makes.
+    """A port for clients of other makers.
 
     Attributes:
         listener: Listening socket.
@@ -30,7 +30,7 @@ class OpenPort:
     def passed(self) -> tuple[int, int]:
         """Return open files for another process: the listener, and a pipe with token and host.
 
-        Words of a command would show the token to everybody on this machine.
+        Command-line arguments would show the token to every user of this machine.
         """
         reader, writer = os.pipe()
         os.write(writer, json.dumps([self.token, self.host]).encode())
@@ -44,10 +44,10 @@ class OpenPort:
             return cls(socket.socket(fileno=listener), *json.load(pipe))
 
     def admission(self, programs: Collection[str] = ()) -> Admission:
-        """Return the rules of its clients.
+        """Return the rules by which clients are admitted.
 
         Args:
-            programs: Origins of programs elsewhere that may ask, with the token.
+            programs: Origins of web applications elsewhere that are admitted with the token.
         """
         names = own_names(self.host, any_port=True, programs=programs)
         return Admission(names, self.token)

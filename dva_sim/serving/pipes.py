@@ -1,8 +1,8 @@
 """Pipes between two processes that never wait for each other.
 
-Lines of JSON that have no room wait in an outbox of a few, of some kinds only the newest; when it
-is full the oldest that may be lost is lost, and counted. Lines that must arrive, such as what an
-action came to, are never dropped: there are few of them.
+JSON lines that cannot be written yet wait in a small outbox; for some kinds, only the newest waits.
+When it is full, the oldest line that may be lost is dropped and counted. Lines that must arrive,
+such as the result of an action, are never dropped: there are few of them.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ Line = dict[str, Any]
 
 
 class Lines:
-    """Pieces of bytes as whole lines."""
+    """Assembles lines from pieces of bytes."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
         self._size = 0
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take some bytes; the lines that are complete with them, without their ends.
+        """Take some bytes and return the lines that they complete, without line ends.
 
         Raises:
-            ValueError: a line does not end.
+            ValueError: a line is longer than `MAX_LINE`.
         """
         first, *rest = data.split(b"\n")
         self._pieces.append(first)
@@ -53,42 +53,42 @@ class Lines:
 
 
 class PipeEnd:
-    """One end of a socket or a pipe; nothing here ever waits.
+    """One end of a socket or a pipe, which never blocks.
 
     Args:
-        end: Number of the open file; it is closed by `close`.
-        following: Function that returns the next bytes to write; None: nothing.
+        end: File descriptor; `close` closes it.
+        following: Function that returns the next bytes to write; None if there are none.
 
     Attributes:
-        is_open: True while the other end is still there.
+        is_open: True until the other end closes or fails.
     """
 
     def __init__(self, end: int, following: Callable[[], bytes | None] = lambda: None) -> None:
         os.set_blocking(end, False)
         self._end = end
         self._following = following
-        self._rest = b""
+        self._unsent = b""
         self._lines = Lines()
         self.is_open = True
 
     def fileno(self) -> int:
-        """Return the number of the file; -1 once it is closed."""
+        """Return the file descriptor; -1 once it is closed."""
         return self._end
 
     def offer(self, data: bytes) -> bool:
-        """Write all of it as there is room, or none of it: whether it was taken."""
+        """Take data to write, now or later; return False if earlier data still waits."""
         if not self.flush() or not self.is_open:
             return False
-        self._rest = data
+        self._unsent = data
         self.flush()
         return True
 
     def flush(self) -> bool:
-        """Write what there is room for; True if nothing waits any more."""
+        """Write as much as fits; return True if nothing is waiting."""
         try:
-            while self.is_open and (data := self._rest or self._following()):
-                self._rest = data
-                self._rest = data[os.write(self._end, data) :]
+            while self.is_open and (data := self._unsent or self._following()):
+                self._unsent = data
+                self._unsent = data[os.write(self._end, data) :]
         except BlockingIOError:
             return False
         except OSError:
@@ -96,7 +96,7 @@ class PipeEnd:
         return True
 
     def read(self) -> bytes | None:
-        """Return the bytes received since; None if none yet, empty if the pipe has ended."""
+        """Return the bytes received since then; None if there are none, empty at the pipe's end."""
         try:
             data = os.read(self._end, READ_BYTES)
         except BlockingIOError:
@@ -107,7 +107,7 @@ class PipeEnd:
         return data
 
     def lines(self) -> list[Line]:
-        """Return the lines received since, except lines that are not JSON."""
+        """Return the lines received since the last call, without those that are not JSON."""
         try:
             whole = self._lines.feed(self.read() or b"")
         except ValueError:
@@ -116,15 +116,12 @@ class PipeEnd:
         return [line for text in whole if (line := _read(text)) is not None]
 
     def close(self) -> None:
-        """Write waiting lines as far as the pipe takes them, and close it; may be repeated.
-
-        The number of the file may soon be that of another one.
-        """
+        """Write as many waiting lines as fit, and close the pipe; may be repeated."""
         if self._end >= 0:
             self.flush()
             self.is_open = False
             os.close(self._end)
-            self._end = -1
+            self._end = -1  # the kernel may give the number to another file at once
 
 
 def _read(text: bytes) -> Line | None:
@@ -136,13 +133,13 @@ def _read(text: bytes) -> Line | None:
 
 
 class WatchedEnd(PipeEnd):
-    """A pipe in an event loop: what comes is taken at once, and what waits is written in time.
+    """A pipe in an event loop: incoming data is taken at once, waiting data written when it fits.
 
     Args:
-        loop: Watches it.
+        loop: Event loop that watches the pipe.
         end: See `PipeEnd`.
         take: Callback for incoming data.
-        ended: Called once when no more will come.
+        ended: Called once at the end of the pipe.
         following: See `PipeEnd`.
     """
 
@@ -170,7 +167,7 @@ class WatchedEnd(PipeEnd):
             self._ended()
 
     def flush(self) -> bool:
-        """Write what there is room for, and the rest later; True if nothing waits any more."""
+        """Write as much as fits now, the rest later; return True if nothing is waiting."""
         done = super().flush()
         if self._waits is done:
             self._waits = not done
@@ -191,12 +188,12 @@ class WatchedEnd(PipeEnd):
 
 @dataclass(frozen=True)
 class LineKinds:
-    """Kinds of lines, by their `k`, that do not wait as others do.
+    """Kinds of lines, by their `k`, with special rules for waiting.
 
     Attributes:
         newest: Kinds of which only the newest line of each key waits.
-        kept: These are never dropped.
-        first_dropped: These before all others.
+        kept: Kinds that are never dropped.
+        first_dropped: Kinds that are dropped before all others.
     """
 
     newest: frozenset[str]
@@ -205,7 +202,7 @@ class LineKinds:
 
 
 class LineOutbox:
-    """Lines that wait to be written.
+    """Lines waiting to be written.
 
     Attributes:
         dropped: Lines that were lost, or replaced by newer ones.
@@ -232,7 +229,7 @@ class LineOutbox:
         self._waiting[key_of_line] = kind, data
 
     def next(self) -> bytes | None:
-        """Take the oldest out."""
+        """Remove and return the oldest line."""
         return self._waiting.popitem(last=False)[1][1] if self._waiting else None
 
     def _drop_one(self) -> None:

@@ -1,4 +1,4 @@
-"""Stands before an application whose clients all have the same rights."""
+"""Admission check in front of an application whose clients all have the same rights."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CLIENT: Final = 1  # rank of every admitted client
 
 
 class PortGuard:
-    """Refuses requests that may not pass; marks the connections of all others as served.
+    """Refuses requests that are not admitted; marks the connections of all others as served.
 
     Args:
         app: Application to guard.

@@ -1,8 +1,8 @@
 """Accepts the connections of a port, a few at a time, and cuts those that stay silent.
 
-The event loop also carries what open pages ask for, an emergency stop among it, so a flood of new
-connections must not occupy it for long: a silent connection costs next to nothing, and no more than
-a few TLS handshakes are computed in a row.
+The event loop also carries the requests of open pages, including emergency stops, so a flood of new
+connections must not occupy it for long: a silent connection costs almost nothing, and only a few
+TLS handshakes are computed in a row.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from dva_sim.serving.port_connections import (
 )
 
 ACCEPTS_PER_TURN: Final = 32  # maximum connections accepted before the loop serves others again
-SERVED_AT_ONCE: Final = 32  # maximum connections with first bytes that are served before that
-HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS, where each costs a millisecond or two
+SERVED_AT_ONCE: Final = 32  # maximum connections with first bytes that are served in a turn
+HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS: a handshake takes 1 to 2 ms
 SWEEP: Final = 1.0  # interval of checks for silent connections [s]
 PAUSE: Final = 0.2  # pause when no file can be opened [s]
 SPARE_FILES: Final = 128  # files other than connections: pipes, pages' files, the audit log
@@ -36,15 +36,15 @@ SHUTDOWN: Final = 1.0  # time for the end of a TLS connection [s]
 
 
 def fitting_places(listeners: int) -> PortConnections:
-    """Return the places of one of some ports: fewer where a process may open few files."""
+    """Make the connections of one of `listeners` ports; few open files allow fewer."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     needed = listeners * MAX_CONNECTIONS + SPARE_FILES
     if soft != resource.RLIM_INFINITY and soft < needed:
-        most = needed if hard == resource.RLIM_INFINITY else min(hard, needed)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
-        needed = max(soft, most)
-    most = min(MAX_CONNECTIONS, max(16, (needed - SPARE_FILES) // listeners))
-    return PortConnections(most, MAX_SERVED * most // MAX_CONNECTIONS)
+        limit = needed if hard == resource.RLIM_INFINITY else min(hard, needed)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, limit), hard))
+        needed = max(soft, limit)
+    limit = min(MAX_CONNECTIONS, max(16, (needed - SPARE_FILES) // listeners))
+    return PortConnections(limit, MAX_SERVED * limit // MAX_CONNECTIONS)
 
 
 class PortListener:
@@ -53,7 +53,7 @@ class PortListener:
     Args:
         sock: A listening socket that does not block.
         make: Function that makes the protocol of a connection.
-        context: For TLS; None: without.
+        context: TLS settings; None: no TLS.
         places: The connections of the port.
     """
 
@@ -83,7 +83,7 @@ class PortListener:
         finally:
             loop.remove_reader(self._sock)
             self._sock.close()
-            for slot in list(self._places.taken):
+            for slot in list(self._places.connections):
                 if not slot.is_served:
                     slot.drop()
 
@@ -97,19 +97,19 @@ class PortListener:
                 connection, _ = self._sock.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
-            except OSError:  # no file is left, here or in the whole system
+            except OSError:  # no file descriptor is left, in this process or the whole system
                 self._pause(PAUSE)
                 return
             slot = self._places.enter(time.monotonic())
             slot.drop = partial(self._close, connection)
-            asyncio.get_running_loop().add_reader(connection, self._heard, connection, slot)
+            asyncio.get_running_loop().add_reader(connection, self._queue, connection, slot)
 
     def _close(self, connection: socket.socket) -> None:
         asyncio.get_running_loop().remove_reader(connection)
         connection.close()
 
-    def _heard(self, connection: socket.socket, slot: PortConnection) -> None:
-        """Note the first word of a connection."""
+    def _queue(self, connection: socket.socket, slot: PortConnection) -> None:
+        """Queue a connection whose first bytes have arrived."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(connection)
         if not self._speaking:
@@ -120,7 +120,7 @@ class PortListener:
         served = 0
         while self._speaking and served < self._at_once:
             connection, slot = self._speaking.pop()  # the newest: older ones may be cut meanwhile
-            if slot in self._places.taken:
+            if slot in self._places.connections:
                 served += 1
                 slot.since = time.monotonic()
                 task = asyncio.ensure_future(self._connect(connection, slot))
@@ -150,7 +150,7 @@ class PortListener:
         except (OSError, asyncio.CancelledError):
             slot.leave()
             if protocol.is_made:
-                protocol.cut()  # its transport closes the file, whose number may be used again
+                protocol.cut()  # its transport closes the socket; the file number may be reused
             else:
                 connection.close()
 

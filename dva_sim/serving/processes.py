@@ -1,7 +1,7 @@
-"""Processes that a program starts: how each becomes ready, is found to have ended, and is ended.
+"""Child processes: start, readiness, failure and end.
 
-Each is in a session of its own, so that Ctrl-C of a terminal reaches the program alone, which then
-ends them in good order.
+Each has a session of its own, so that Ctrl-C in a terminal reaches only the program, which then
+ends its children in order.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 READY_WITHIN = 30.0  # time from the start of a process to its first message [s]
 END_WITHIN = 5.0  # time for a process to end by itself when asked to [s]
 EXIT_DELAY_S = 0.8  # time between the end of a process's output and its own end [s]
-LOOK = 0.01  # interval of checks of a process that is awaited [s]
-LAST_WORDS = 10_000  # end of the standard error in which the last line is looked for [B]
+LOOK = 0.01  # interval of checks while waiting for a process [s]
+LAST_WORDS = 10_000  # size of the end of standard error that is searched for its last line [B]
 
 T = TypeVar("T")
 
 
 class ChildFailed(RunsFailed):
-    """A process that was started could not begin, or ended by itself."""
+    """Failure of a child process to start, or its unexpected end."""
 
 
 class Child(subprocess.Popen[bytes]):
     """A process that this one has started.
 
     Args:
-        name: Name for people, as `the web process`.
-        words: Its command line.
-        lifeline: Closes the channel whose end tells the process to end. Without one, its standard
-            input is closed if that is a pipe; else it gets SIGTERM.
-        keeps_errors: True to keep what it says on standard error, whose last line tells why it
-            ended. That goes to a file without a name: it never waits until somebody reads.
+        name: Name for people, such as `the web process`.
+        words: Command line.
+        lifeline: Function that closes the channel whose end tells the process to end. Without one,
+            its standard input is closed if it is a pipe; otherwise it gets SIGTERM.
+        keeps_errors: True to keep its standard error, whose last line says why it ended. It is
+            written to an unnamed file rather than a pipe, which could fill up and block it.
         options: See `subprocess.Popen`.
     """
 
@@ -55,14 +55,14 @@ class Child(subprocess.Popen[bytes]):
         self._errors = TemporaryFile() if keeps_errors else None  # noqa: SIM115 - closed by `forget`
         if self._errors is not None:
             options["stderr"] = self._errors
-        usual = {"stdin": subprocess.DEVNULL, "start_new_session": True}
-        super().__init__(words, **usual | options)
+        defaults = {"stdin": subprocess.DEVNULL, "start_new_session": True}
+        super().__init__(words, **defaults | options)
 
     def ready(self, look: Callable[[], T | None], within: float = READY_WITHIN) -> T:
         """Call `look` until it returns something, and return that.
 
         Raises:
-            ChildFailed: it ended, or there was nothing for `within` seconds.
+            ChildFailed: the process ended, or `look` returned nothing for `within` seconds.
         """
         deadline = time.monotonic() + within
         while (result := look()) is None:
@@ -74,7 +74,7 @@ class Child(subprocess.Popen[bytes]):
         return result
 
     def why(self) -> str:
-        """Return in one line that it has ended, and why: its last words, or how it ended."""
+        """Return one line on why it ended: its last line of output, or its exit code or signal."""
         with suppress(subprocess.TimeoutExpired):
             self.wait(EXIT_DELAY_S)
         code = self.returncode
@@ -84,7 +84,7 @@ class Child(subprocess.Popen[bytes]):
         return f"{self.name} has ended by itself: {self._last_line() or how}"
 
     def failure(self) -> DvaSimError:
-        """Make the error of a process that has ended by itself; a user's mistake stays one."""
+        """Return the error for an unexpected end, or for a user's mistake, by the exit code."""
         kind = DvaSimError if self.returncode == ExitCode.MISTAKE else ChildFailed
         return kind(self.why())
 
@@ -92,12 +92,12 @@ class Child(subprocess.Popen[bytes]):
         if self._errors is None:
             return ""
         file = self._errors.fileno()
-        # Both processes share one place in the file: to move it would spoil what is written next.
+        # Both processes share the file offset: `seek` here would misplace the child's next write.
         text = os.pread(file, LAST_WORDS, max(0, os.fstat(file).st_size - LAST_WORDS))
         lines = text.decode(errors="replace").strip().splitlines()
         return lines[-1].removeprefix(ERROR) if lines else ""
 
-    def ask(self) -> None:
+    def request_end(self) -> None:
         """Ask the process to end."""
         if self._lifeline is not None:
             self._lifeline()
@@ -118,16 +118,16 @@ def end_all(
     within: float = END_WITHIN,
     meanwhile: Callable[[float], object] = time.sleep,
 ) -> None:
-    """Ask processes to end, in this order, and make sure that they have.
+    """End processes: ask each in this order, wait, and kill those that remain.
 
     Args:
-        children: The processes; those that have ended already are welcome.
-        within: Time until those that are still there are killed [s].
-        meanwhile: Called with a time to spend [s], again and again until they have ended.
+        children: The processes; some may have ended already.
+        within: Time after which running ones are killed [s].
+        meanwhile: Called repeatedly until all have ended, with the time to wait [s].
     """
     children = list(children)
     for child in children:
-        child.ask()
+        child.request_end()
     deadline = time.monotonic() + within
     while any(child.poll() is None for child in children):
         if time.monotonic() >= deadline:

@@ -1,4 +1,4 @@
-"""A server of HTTP in a process of ours: its listening socket, its settings, and its end."""
+"""An HTTP server within a process: its listening socket, its settings, and its end."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Server(uvicorn.Server):
 
     @classmethod
     def of(cls, app: ASGIApp, most_bytes: int, **more: Any) -> Server:
-        """Return the server of an application, with bounded complaints and no logs.
+        """Return a server for an application, with no access log and a limited error log.
 
         Args:
             app: The application.
-            most_bytes: Longest head of a request [B].
-            more: More settings of uvicorn, such as a certificate.
+            most_bytes: Maximum size of a request's head [B].
+            more: Further settings of uvicorn, such as a certificate.
         """
         limit_complaints()
         config = uvicorn.Config(
@@ -47,23 +47,23 @@ class Server(uvicorn.Server):
         return cls(config)
 
     def protocol(self, slot: PortConnection) -> HttpProtocol:
-        """Return what serves a connection."""
+        """Return the protocol that serves a connection."""
         return HttpProtocol(slot, config=self.config, server_state=self.server_state, app_state={})
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave signals to the process."""
+        """Install no signal handlers: the process has its own."""
         yield
 
 
 async def serve(
     server: Server, sock: socket.socket, places: PortConnections, ended: asyncio.Event
 ) -> None:
-    """Serve until the end."""
+    """Serve until `ended` is set."""
     server.config.load()
     listener = PortListener(sock, server.protocol, server.config.ssl, places)
     accepting = asyncio.ensure_future(listener.run())
-    serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts in its place
+    serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts instead
     waiting = asyncio.ensure_future(ended.wait())
     tasks = {accepting, serving, waiting}
     await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -77,7 +77,7 @@ MAX_COMPLAINTS = 5
 
 
 def limit_complaints() -> None:
-    """Limit the loggers of the server and of its event loop to a few complaints in all."""
+    """Limit the loggers of the server and its event loop to a few records in all."""
     handler = Complaints()
     for name in ("uvicorn.error", "asyncio"):
         logger = logging.getLogger(name)
@@ -87,7 +87,7 @@ def limit_complaints() -> None:
 
 
 class Complaints(logging.StreamHandler):  # type: ignore[type-arg]
-    """Writes the first few records in full, and none about what clients sent or how they left."""
+    """Log handler that writes the first few records, and none about faults of clients."""
 
     NOISE = ("Invalid", "Cancel", "Unsupported", "No supported", "ASGI callable")
 
@@ -96,10 +96,10 @@ class Complaints(logging.StreamHandler):  # type: ignore[type-arg]
         self._count = 0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a complaint, unless it is of a client or there were enough."""
+        """Write a record, unless it concerns a client or the limit is reached."""
         cut_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
         if cut_off or record.getMessage().startswith(self.NOISE):
             return
         self._count += 1
-        if self._count <= MAX_COMPLAINTS:  # nobody may read them
+        if self._count <= MAX_COMPLAINTS:  # standard error may be a pipe that nobody reads
             super().emit(record)

@@ -1,4 +1,4 @@
-"""The signals that ask a program to end, as something to wait for."""
+"""Ending signals of a program, received through a socket that can be waited for."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ ENDING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 @contextmanager
 def caught_signals() -> Iterator[socket.socket]:
-    """Give a socket that yields the number of each signal that would end this process, as a byte.
+    """Receive ending signals on a socket, as one byte each with the signal's number.
 
-    Signals that are ignored, as SIGHUP by `nohup`, stay so.
+    Signals that are ignored, such as SIGHUP under `nohup`, stay ignored.
     """
     reads, writes = socket.socketpair()
     writes.setblocking(False)
-    # A handler of Python's own may run too late: another thread may have got the signal.
-    woken = signal.set_wakeup_fd(writes.fileno())
-    heard = [n for n in ENDING if signal.getsignal(n) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda *_: None) for number in heard}
+    # A Python handler may run too late: it waits for the main thread, which may be blocked.
+    earlier_fd = signal.set_wakeup_fd(writes.fileno())
+    caught = [n for n in ENDING if signal.getsignal(n) is not signal.SIG_IGN]
+    earlier_handlers = {number: signal.signal(number, lambda *_: None) for number in caught}
     with reads, writes:
         try:
             yield reads
         finally:
-            for number, handler in before.items():
+            for number, handler in earlier_handlers.items():
                 signal.signal(number, handler)
-            signal.set_wakeup_fd(woken)
+            signal.set_wakeup_fd(earlier_fd)

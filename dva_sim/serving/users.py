@@ -1,8 +1,8 @@
 """Users of a console: a file with each one's role and the Argon2 hash of the password.
 
 References:
-    RFC 9106 (2021), Argon2: the parameters are those of its second recommended option, which the
-    library has as its default.
+    RFC 9106 (2021), Argon2: the parameters are its second recommended option, the default of
+    the library.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class User:
     """A user of a console.
 
     Attributes:
-        name: Name, as logs and the audit log have it.
+        name: Name, as it appears in logs and the audit log.
         role: One of `ROLES`.
         password: Argon2 hash of the password.
         locked: True if the user may not log in.
@@ -47,7 +47,7 @@ class User:
     locked: bool = False
 
 
-def hash_of(password: str) -> str:
+def hash_password(password: str) -> str:
     """Return the Argon2 hash of a new password.
 
     Raises:
@@ -61,11 +61,11 @@ def hash_of(password: str) -> str:
 
 
 def is_password_of(user: User | None, password: str) -> bool:
-    """Return True if a password is that of a user; for nobody it takes as long, and is False."""
+    """Return True if a password is the user's; None takes as long, and returns False."""
     from argon2 import PasswordHasher  # late: start-up
     from argon2.exceptions import InvalidHashError, VerificationError  # late: start-up
 
-    password_hash = user.password if user is not None else _NOBODYS
+    password_hash = user.password if user is not None else _DUMMY_HASH
     try:
         PasswordHasher().verify(password_hash, password[:MAX_LETTERS])
     except (VerificationError, InvalidHashError):
@@ -73,8 +73,8 @@ def is_password_of(user: User | None, password: str) -> bool:
     return user is not None
 
 
-# Of a password that nobody knows: a name that does not exist takes as long as one that does.
-_NOBODYS: Final = (
+# Hash of a random password, checked for unknown names so that timing does not reveal which exist.
+_DUMMY_HASH: Final = (
     "$argon2id$v=19$m=65536,t=3,p=4$jdlNni01KYGLybqoucCjCQ"
     "$CwjhY/taxjJLGiTf9xCvTjKSgtipxeFTwAwGKkwf/Hw"
 )
@@ -87,7 +87,7 @@ class UserFile:
         path: The file; one that does not exist has no users.
 
     Raises:
-        ConfigError: it cannot be read, or is no file of users.
+        ConfigError: it cannot be read, or is not a file of users.
     """
 
     def __init__(self, path: Path) -> None:
@@ -100,7 +100,7 @@ class UserFile:
         """Add a user.
 
         Raises:
-            ConfigError: the name is none or taken, or role or password are not as they should be.
+            ConfigError: the name is invalid or taken, or the role or password is invalid.
         """
         if not _NAME.fullmatch(name):
             problem = "a name should have 1 to 40 letters, digits, spaces, dots or hyphens"
@@ -109,7 +109,7 @@ class UserFile:
             raise ConfigError(f"there is a user {name!r} already; change that one", self.path)
         if len(self.users) >= MAX_USERS:
             raise ConfigError(f"there are {MAX_USERS} users already", self.path)
-        self._put(User(name, _role(role), hash_of(password)))
+        self._put(User(name, _role(role), hash_password(password)))
 
     def change(
         self,
@@ -119,17 +119,17 @@ class UserFile:
         password: str | None = None,
         locked: bool | None = None,
     ) -> None:
-        """Change a user; values that are None stay.
+        """Change a user; None keeps a value.
 
         Raises:
-            ConfigError: there is no such user, or the new values are not as they should be.
+            ConfigError: there is no such user, or a new value is invalid.
         """
         user = self.find(name)
         changes: dict[str, Any] = {}
         if role is not None:
             changes["role"] = _role(role)
         if password is not None:
-            changes["password"] = hash_of(password)
+            changes["password"] = hash_password(password)
         if locked is not None:
             changes["locked"] = locked
         self._put(replace(user, **changes))
@@ -147,7 +147,7 @@ class UserFile:
         """Return a user.
 
         Raises:
-            ConfigError: there is none of that name.
+            ConfigError: there is no user of that name.
         """
         if name not in self.users:
             raise ConfigError(f"there is no user {name!r}", self.path)
@@ -161,7 +161,7 @@ class UserFile:
         content = {"users": [asdict(user) for user in self.users.values()]}
         try:
             with whole(self.path) as part:
-                part.touch(0o600)  # before the first byte is in it
+                part.touch(0o600)  # private before it has content
                 part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
         except OSError as error:
             raise ConfigError(f"cannot be written: {error.strerror}", self.path) from None

@@ -1,4 +1,4 @@
-"""WebSockets to clients that may be slow, hostile or gone: one message in flight, a deadline."""
+"""WebSockets to clients that may be slow, hostile or gone: one message at a time, deadlines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dva_sim.serving.connection import PLACE, WIRE, extended, reset, wire_of
 from dva_sim.serving.port_connections import PortConnection
 
 STALLED: Final = 5.0  # a client that takes no byte for this long is dropped [s]
-FAREWELL: Final = 10.0  # time for data under way to a dropped client [s]
+FAREWELL: Final = 10.0  # time for a dropped client to read waiting data [s]
 
 
 class WireProtocol(WebSocketsSansIOProtocol):
@@ -36,7 +36,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._place.leave()
 
     def keepalive_timeout(self) -> None:
-        """Cut a client that answers no ping: it will not read waiting data either."""
+        """Cut a client that answers no ping: it would not read waiting data either."""
         super().keepalive_timeout()
         reset(self.transport)
 
@@ -46,7 +46,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         return self.transport.get_write_buffer_size()
 
     def drop(self, code: int, reason: str) -> None:
-        """Send the reason after all waiting data, and cut the connection if that takes too long."""
+        """Send the reason after all waiting data; cut the connection if that takes too long."""
         if self.disconnected or self.close_sent:
             return
         with suppress(InvalidState):  # the client is closing it at this moment
@@ -58,7 +58,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
 
 
 async def say(ws: WebSocket, message: str | bytes) -> bool:
-    """Send a message: False if the client has not taken a byte for too long."""
+    """Send a message; return False if the client has not taken a byte for too long."""
     wire = wire_of(ws.scope)
     before = wire.waiting
     leaving = ws.send_text(message) if isinstance(message, str) else ws.send_bytes(message)

@@ -22,7 +22,7 @@ def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
     assert first.begin(LOOK, 3.0)
     entered(places, 4.0, cut, "newcomer")
     assert cut == ["at 1.0"]
-    assert len(places.taken) == 3
+    assert len(places.connections) == 3
 
 
 def test_when_all_places_are_taken_each_newcomer_has_its_turn_before_it_makes_room():
@@ -83,7 +83,7 @@ def test_a_connection_that_cannot_be_cut_keeps_no_other():
     entered(places, 0.0, cut, "silent")
     places.sweep(SILENT + 1.0)
     assert cut == ["silent"]
-    assert len(places.taken) == 0
+    assert len(places.connections) == 0
 
 
 def test_a_request_with_a_token_is_never_cut_for_a_newcomer():
