@@ -1,4 +1,4 @@
-"""The body of a robot of ROS: it is where its odometry says, and moves by velocity commands."""
+"""The body of a ROS robot, placed by its odometry and moved by velocity commands."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ STANDS_BELOW: Final = 0.02  # a slower robot counts as standing [m/s, rad/s]
 
 
 class RosBody(RobotBody):
-    """A body that no physics moves: `place` says where it is, and `send` takes its commands.
+    """A body outside of the physics: `place` sets its pose, and `send` passes its commands on.
 
     A command is repeated while it is in force. After its end the robot gets stop commands until it
-    stands, and for `STOP_REPEATED` in any case; then nothing is published, so that others may drive
-    it.
+    stands, and for at least `STOP_REPEATED`; then nothing is published, so that other programs may
+    drive it.
 
     Args:
-        world: The site; physics of others pass it by.
+        world: The site; its physics does not act on this body.
         name: Label of the robot.
         spec: Limits that commands are clamped to.
         clock: Real time.
-        period: Between two repetitions of a command [s].
+        period: Interval of repetitions of a command [s].
         send: Callback for speed [m/s] and turn rate [rad/s]; returns False if they could not be
             sent.
 
     Attributes:
-        stopped_at: Time since which the robot should slow down and stand [s].
+        stopped_at: Time at which the robot was last told to stand [s].
         has_stood: True if it has stood since then.
     """
 
@@ -67,7 +67,10 @@ class RosBody(RobotBody):
         return speed, turn_rate, until if speed or turn_rate else 0.0
 
     def place(self, motion: RosMotion) -> None:
-        """Be where odometry says, and move so."""
+        """Set pose and velocity as odometry reports them.
+
+        The physics counts full turns, odometry does not: the angle nearest the previous one is set.
+        """
         body = self.body
         heading = motion.heading
         turns = round((body.angle - heading) / (2.0 * math.pi))
@@ -81,14 +84,15 @@ class RosBody(RobotBody):
 
     @override
     def drive(self, speed: float, turn_rate: float, until: float) -> None:
-        most = self.spec.max_speed
-        fastest = self.spec.max_turn_rate
+        max_speed = self.spec.max_speed
+        max_turn_rate = self.spec.max_turn_rate
         now = self._clock.now
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
             speed = turn_rate = 0.0
-        speed = 0.0 if speed < 0.0 else most if speed > most else speed
-        if not -fastest <= turn_rate <= fastest:
-            turn_rate = math.copysign(fastest, turn_rate)
+        # NaN was replaced above: it would pass these comparisons.
+        speed = 0.0 if speed < 0.0 else max_speed if speed > max_speed else speed
+        if not -max_turn_rate <= turn_rate <= max_turn_rate:
+            turn_rate = math.copysign(max_turn_rate, turn_rate)
         self._set_point = speed, turn_rate, until
         moves = (speed != 0.0 or turn_rate != 0.0) and until > now
         if not moves:

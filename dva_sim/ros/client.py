@@ -12,19 +12,19 @@ from dva_sim.ros.websocket import WebSocketDialer, WebSocketUrl
 
 FIRST_PAUSE = 0.5  # design: pause before the second attempt to connect [s]
 MAX_PAUSE = 2.0  # design: longest pause before another attempt to connect [s]
-SILENT_AFTER: Final = 5.0  # design: a connection over which nothing comes is given up [s]
+SILENT_AFTER: Final = 5.0  # design: silence after which a connection is given up [s]
 LARGEST: Final = 16_000_000  # design: a larger message ends the connection [B]
 MAX_QUEUED: Final = 200_000  # design: backlog behind which commands are not queued [B]
 
 
 class Subscribed(NamedTuple):
-    """A topic that is read.
+    """A topic to read.
 
     Attributes:
         type: Type of its messages, in the spelling of this version of ROS.
         take: Callback for each message.
-        largest: Larger ones are dropped unread [B].
-        throttle_ms: The server sends no more often.
+        largest: Maximum size of a message; larger ones are dropped unread [B].
+        throttle_ms: Minimum interval between two messages, kept by the server [ms].
     """
 
     type: str
@@ -34,7 +34,7 @@ class Subscribed(NamedTuple):
 
 
 class RosbridgeClient:
-    """Keeps a connection to a rosbridge server, and tells when it is lost and when it is back.
+    """Keeps a connection to a rosbridge server, and reports when it is made or lost.
 
     Args:
         clock: Polls the socket.
@@ -75,7 +75,7 @@ class RosbridgeClient:
         clock.every(1.0, self._look)
 
     def connect(self) -> None:
-        """Begin to connect; from now on it tries again by itself."""
+        """Begin to connect; failed attempts and lost connections are retried automatically."""
         if self._is_over:
             return
         self._dialer = WebSocketDialer(
@@ -88,7 +88,7 @@ class RosbridgeClient:
         )
 
     def publish(self, topic: str, message: Mapping[str, Any]) -> bool:
-        """Publish on an advertised topic; return False if the message cannot leave now."""
+        """Publish on an advertised topic; return False if the message cannot be sent now."""
         connection = self._dialer.connection if self._dialer is not None else None
         if not self.is_connected or connection is None or connection.waiting > MAX_QUEUED:
             return False
@@ -96,12 +96,12 @@ class RosbridgeClient:
         return self.is_connected
 
     def call(self, service: str, answered: Callable[[bool, str], object]) -> None:
-        """Call a service without arguments; `answered` takes success and text, once it comes."""
+        """Call a service without arguments; `answered` takes success and text of the response."""
         self._calls[service] = answered
         self._send({"op": "call_service", "service": service, "id": service, "args": {}})
 
     def renew(self, why: str) -> None:
-        """Drop the connection, with all that waits in it, and connect again."""
+        """Drop the connection with all waiting data, and connect again."""
         if self.is_connected and self._dialer is not None:
             assert self._dialer.connection is not None
             self._dialer.connection.end(why)
@@ -132,7 +132,7 @@ class RosbridgeClient:
                     "topic": topic,
                     "type": subscription.type,
                     "throttle_rate": subscription.throttle_ms,
-                    "queue_length": 1,  # of old readings none is of use
+                    "queue_length": 1,  # old readings are useless
                 }
             )
         self._on_change("")
@@ -147,7 +147,7 @@ class RosbridgeClient:
         self._on_change(why)
 
     def _look(self) -> None:
-        """Give a connection up over which nothing comes: a peer may be gone without a word."""
+        """Give up a silent connection: a peer may vanish without closing it."""
         connection = self._dialer.connection if self._dialer is not None else None
         if not self.is_connected or connection is None:
             return
@@ -188,7 +188,7 @@ class RosbridgeClient:
             answered(done, str(answer.get("message", ""))[:120])
 
     def _topic_of(self, data: bytes) -> str:
-        """Return the topic of a message that may be too large to be read."""
+        """Return the topic of a message that may be too large to parse."""
         for topic in self._topics:
             name = f'"{topic}"'.encode()
             if name in data[:300] or name in data[-300:]:

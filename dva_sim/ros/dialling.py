@@ -1,4 +1,4 @@
-"""TCP connections that are made without blocking the thread of a run."""
+"""TCP connections, made without blocking the thread of a run."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class Dialling:
     """One attempt to connect.
 
     Args:
-        clock: Gives the time to look.
+        clock: Clock that schedules the checks.
         host: Name or address.
         port: TCP port.
-        connected: Callback for the socket, which does not block.
+        connected: Callback for the connected, non-blocking socket.
         failed: Callback with the reason of a failure.
     """
 
@@ -69,7 +69,7 @@ class Dialling:
         return False
 
     def cancel(self) -> None:
-        """Try no longer."""
+        """Give up the attempt."""
         if self._sock is not None:
             self._sock.close()
             self._sock = None

@@ -1,6 +1,6 @@
 """Fitness of a ROS robot for driving: bridge up, odometry fresh, commands obeyed.
 
-Pure: it takes what happened with its time, and returns what is wrong.
+Pure: it takes events with their times, and returns what is wrong.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ NO_BRIDGE: Final = "the bridge is not connected"
 
 
 class Fitness:
-    """Reasons that a robot cannot be driven, by its messages and the state of the bridge.
+    """Reasons for not driving a robot, from its messages and the state of the bridge.
 
-    Odometry is late when none has come for `odometry_within_s`, or when it is that much older
-    than the freshest so far: a bridge whose queue grows delivers steadily what is long past.
+    Odometry is late when none has arrived for `odometry_within_s`, or when its delay has grown by
+    that much above the smallest delay so far: a bridge with a growing queue delivers old messages
+    at a steady rate.
 
     Args:
         limits: Times of the profile.
@@ -30,20 +31,20 @@ class Fitness:
         self._limits = limits
         self._bridge = NO_BRIDGE
         self._refused = ""
-        self._heard = -math.inf
-        self._best = math.inf
-        self._at = 0.0
-        self._behind = 0.0
+        self._odometry_at = -math.inf
+        self._least_delay = math.inf
+        self._least_delay_at = 0.0
+        self._extra_delay = 0.0
         self._late_since = math.inf
         self._does_not_stop = False
         self._disabled = ""
 
     def connected(self) -> None:
-        """Note that the bridge is there; an earlier connection's news count no more."""
+        """Note that the bridge is connected; odometry of earlier connections no longer counts."""
         self._bridge = self._refused = ""
-        self._heard = -math.inf
-        self._best = math.inf
-        self._behind = 0.0
+        self._odometry_at = -math.inf
+        self._least_delay = math.inf
+        self._extra_delay = 0.0
         self._late_since = math.inf
 
     def lost(self, why: str) -> None:
@@ -53,20 +54,24 @@ class Fitness:
 
     def moved(self, now: float, stamp: float | None) -> None:
         """Take odometry, measured at `stamp` by the robot's clock [s]."""
-        self._heard = now
+        self._odometry_at = now
         self._refused = ""
         if stamp is not None:
+            # The clocks are not synchronised: only the growth of the offset shows a delay. The
+            # smallest one may rise slowly, as the robot's clock may be faster or slower.
             offset = now - stamp
-            self._best = min(offset, self._best + DRIFT * (now - self._at))
-            self._at = now
-            self._behind = offset - self._best
+            self._least_delay = min(
+                offset, self._least_delay + DRIFT * (now - self._least_delay_at)
+            )
+            self._least_delay_at = now
+            self._extra_delay = offset - self._least_delay
 
     def refused(self, why: str) -> None:
-        """Note that odometry has come that says nothing of use."""
+        """Note that unusable odometry has arrived, and why."""
         self._refused = why
 
     def disabled(self, why: str) -> None:
-        """Note why it has to be enabled, and is not yet; empty: it is."""
+        """Note why the robot is not enabled yet; an empty text once it is."""
         self._disabled = why
 
     def obeys(self, now: float, stopped_at: float, has_stood: bool) -> None:
@@ -77,10 +82,10 @@ class Fitness:
         """Return why the robot cannot be driven; empty if it can."""
         if self._bridge:
             return self._bridge
-        if self._heard == -math.inf:
+        if self._odometry_at == -math.inf:
             return f"odometry is refused: {self._refused}" if self._refused else NO_ODOMETRY
         late = self._limits.odometry_within_s
-        if now - self._heard > late or self._behind > late:
+        if now - self._odometry_at > late or self._extra_delay > late:
             self._late_since = min(self._late_since, now)
             why = f": {self._refused}" if self._refused else ""
             return f"odometry is more than {late:g} s late{why}"
@@ -93,4 +98,4 @@ class Fitness:
 
     def needs_another_bridge(self, now: float) -> bool:
         """Return True if odometry has been late for so long that a new connection may help."""
-        return not self._bridge and self._behind > 0 and now - self._late_since > BACKLOG
+        return not self._bridge and self._extra_delay > 0 and now - self._late_since > BACKLOG

@@ -1,7 +1,7 @@
-"""Robots of a DVA as clients of ROS find them: heard over the network, driven by permission.
+"""Robots of a DVA for clients of ROS: received over the network, driven by permission.
 
-Nothing here looks at a robot itself: what is known of one has come by its messages, over the link
-of the run. Each client that takes control is a device of its own, with a session of its own.
+Nothing here reads a robot's true state: all data has come in messages over the link of the run.
+Each client that takes control is a device of its own, with a session of its own.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class ScanReader:
     """Reads the lidar of a robot, with a permission to do so, until `end`.
 
     Args:
-        device: Device that reads.
+        device: Device that subscribes.
         robot: Id of the robot.
         take: Callback for ranges [m].
     """
@@ -74,13 +74,13 @@ class ScanReader:
         self._session = 0
         self._is_over = False
         topic = sensor_topic(LIDAR, device.id_tag)
-        self._heard = device.network.subscribe(device.id_tag, robot, topic, self._on_value)
+        self._subscription = device.network.subscribe(device.id_tag, robot, topic, self._on_value)
         self._ask()
 
     def _ask(self) -> None:
         if not self._is_over:
-            wish = m.PermissionRequest(self._robot, "sensors", (LIDAR,))
-            self._device.ask(self._device.dva, wish, self._answered)
+            request = m.PermissionRequest(self._robot, "sensors", (LIDAR,))
+            self._device.ask(self._device.dva, request, self._answered)
             self._device.clock.call_after(RENEW, self._ask)
 
     def _answered(self, reply: m.Reply) -> None:
@@ -109,7 +109,7 @@ class ScanReader:
     def end(self) -> None:
         """Give the permission back."""
         self._is_over = True
-        self._heard.close()
+        self._subscription.close()
         if self._session:
             self._device.ask(self._robot, m.DevSub(LIDAR, 0.0), session=self._session)
             give_back(self._device, self._robot, self._session)
@@ -119,7 +119,7 @@ class RosDriver:
     """A client that is in control of robots, or was.
 
     Args:
-        device: Its own.
+        device: Device of the client.
         console: Function that returns pattern, rate and limits of the next drive.
     """
 
@@ -128,18 +128,18 @@ class RosDriver:
         self._person = PersonAgent(device, console(), lambda: GivenVelocity(phone))
         self._console = console
         self._number = 0
-        self._wanted: set[str] = set()
+        self._requested: set[str] = set()
         self._newest: dict[str, int] = {}
         device.register()
 
     @property
     def device(self) -> AgentDevice:
-        """Its device."""
+        """Device of the client."""
         return self._person.device
 
     def take(self, robot: str, on_result: OnResult) -> None:
-        """Ask the DVA for a robot, and the robot to be driven."""
-        self._wanted.add(robot)
+        """Request permission from the DVA, then start driving the robot."""
+        self._requested.add(robot)
         self._take(robot, on_result, TAKE_TRIES)
 
     def _take(self, robot: str, on_result: OnResult, tries: int) -> None:
@@ -155,7 +155,7 @@ class RosDriver:
         def begun(done: bool, text: str) -> None:
             if done:
                 on_result(True, text)
-            else:  # what has ended the start has the last word on who holds the robot
+            else:  # later: the handler that ended the start first updates who holds the robot
                 self.device.clock.call_after(0.0, not_begun, text)
 
         def not_begun(text: str) -> None:
@@ -163,7 +163,7 @@ class RosDriver:
             if control is not None:
                 control.give_back()
                 on_result(False, text)
-            elif tries > 1 and robot in self._wanted:
+            elif tries > 1 and robot in self._requested:
                 # The permission ran out while connections were made over a long link.
                 self._take(robot, on_result, tries - 1)
             else:
@@ -174,8 +174,8 @@ class RosDriver:
         self._person.take([robot], taken)
 
     def release(self, robot: str, on_result: OnResult) -> None:
-        """Stop a robot, and give it back."""
-        self._wanted.discard(robot)
+        """Stop a robot, and return its permission."""
+        self._requested.discard(robot)
         control = self._person.robots.get(robot)
         if control is None:
             on_result(False, "it is not yours")
@@ -189,12 +189,12 @@ class RosDriver:
         return bool(self._person.robots)
 
     def release_all(self) -> None:
-        """Stop and give back everything: the client is gone."""
-        self._wanted.clear()
+        """Stop all robots and return their permissions, since the client is gone."""
+        self._requested.clear()
         self._person.release(lambda *_: None)
 
     def drive(self, robot: str, speed: float, turn_rate: float) -> str:
-        """Command a speed [m/s] and a turn rate [rad/s]; return why not, or an empty text.
+        """Command a speed [m/s] and turn rate [rad/s]; return the reason of a refusal, or "".
 
         What is beyond the robot's reach counts as the reach.
         """
@@ -212,7 +212,7 @@ class RosDriver:
         return ""
 
     def _fell_silent(self, robot: str, number: int) -> None:
-        """Let a robot stand if no command came after one."""
+        """Stop a robot if no command has followed the one of this number."""
         control = self._person.robots.get(robot)
         if self._newest.get(robot) == number and control is not None and control.is_driven:
             self._number += 1
@@ -220,7 +220,7 @@ class RosDriver:
 
 
 class RosGateway:
-    """The devices through which clients of ROS hear and drive robots.
+    """The devices through which clients of ROS receive data from robots and drive them.
 
     Args:
         stage: Stage on which the devices are made.
@@ -228,12 +228,12 @@ class RosGateway:
             the scenario.
 
     Attributes:
-        robots: Those that the DVA has on its list, by their namespace.
-        on_frame: Callback for news of a robot: the robot, an observation, and its capture time [s].
+        robots: Robots on the DVA's device list, by namespace.
+        on_frame: Callback for the robot and a camera frame of it.
         on_scan: Callback for the robot, and ranges [m].
         on_picture: Callback for the robot, a JPEG, and its capture time [s].
-        camera_base: URL below which pictures are of this console itself; empty: none are.
-        camera_token: Shown to the server there, and to no other; empty: none.
+        camera_base: URL of this console's own picture server; empty: none.
+        camera_token: Token for that server, sent to no other; empty: none.
     """
 
     def __init__(self, stage: Stage, console: Callable[[], Console] | None = None) -> None:
@@ -254,7 +254,7 @@ class RosGateway:
         self._free.append(self._new_driver())
         self.device.register(self._look_around)
 
-    # --- who is there --------------------------------------------------------------------
+    # --- the device list -----------------------------------------------------------------
 
     def _look_around(self) -> None:
         self.device.ask(self.device.dva, m.GetDeviceList(), self._listed)
@@ -279,10 +279,10 @@ class RosGateway:
                     each.introduce(device.id_tag, device.address)
                     each.connect(device.id_tag)
 
-    # --- what is heard -------------------------------------------------------------------
+    # --- subscriptions -------------------------------------------------------------------
 
     def listen(self, name: str, *, frames: bool, scan: bool, pictures: bool) -> None:
-        """Subscribe to what clients want of a robot, and to nothing else."""
+        """Subscribe to the data of a robot that clients want, and end all other subscriptions."""
         robot = self.robots[name]
         self._look(robot, pictures)
         if frames and robot.frames is None:
@@ -300,7 +300,7 @@ class RosGateway:
             robot.scan = None
 
     def _look(self, robot: KnownRobot, pictures: bool) -> None:
-        """Open the stream of a robot's camera, whose address it gives, or close it."""
+        """Open or close the picture stream of a robot, which is asked for its address."""
         if not pictures and robot.pictures is not None:
             robot.pictures.close()
             robot.pictures = None
@@ -326,18 +326,18 @@ class RosGateway:
     def _on_jpeg(self, robot: KnownRobot, jpeg: bytes, captured: float | None) -> None:
         self.on_picture(robot, jpeg, self.clock.now if captured is None else captured)
 
-    def _on_frame(self, robot: KnownRobot, came: CameraFrame | bytes) -> None:
-        frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
+    def _on_frame(self, robot: KnownRobot, data: CameraFrame | bytes) -> None:
+        frame = data if isinstance(data, CameraFrame) else CameraFrame.unpack(data)
         if frame is not None and math.isfinite(frame.captured):
             self.on_frame(robot, frame)
 
     def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
         self.on_scan(robot, ranges)
 
-    # --- who drives ----------------------------------------------------------------------
+    # --- drivers -------------------------------------------------------------------------
 
     def driver(self) -> RosDriver | None:
-        """Return a driver for a client; None: too many are in control."""
+        """Return a driver for a client; None if too many are in control."""
         if self._free:
             return self._free.pop()
         return self._new_driver() if len(self._drivers) < MAX_DRIVERS else None

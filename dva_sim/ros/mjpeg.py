@@ -21,15 +21,15 @@ _TIME = re.compile(rb"\r\nX-Frame-Time-Ms: (\d{1,15})\r\n", re.IGNORECASE)
 
 
 class MjpegReader:
-    """Reads one stream until it is closed; one that ends is opened again.
+    """Reads one stream until `close`, reopening it whenever it ends.
 
     Args:
         clock: Polls the socket.
         url: `http://HOST:PORT/PATH`.
-        token: Shown to the server; empty: none.
-        take: Callback for each picture, and its capture time [s]; None: not said.
-        is_trusted: True if the host may have a name. Others may not: looking a name up would block
-            the thread, which carries emergencies, too.
+        token: Token sent to the server; empty: none.
+        take: Callback for each picture, and its capture time [s]; None if unknown.
+        is_trusted: True if the host may be a name. Otherwise it must be an address: looking up a
+            name would block the thread, which also carries emergencies.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class MjpegReader:
         self._clock = clock
         self._token = token
         self._take = take
-        self._host, self._port, self._path = _place_of(url, is_trusted)
+        self._host, self._port, self._path = _parse(url, is_trusted)
         self._sock: socket.socket | None = None
         self._dialling: Dialling | None = None
         self._data = bytearray()
@@ -59,11 +59,11 @@ class MjpegReader:
     def _ask(self, sock: socket.socket) -> None:
         query = f"?token={self._token}" if self._token else ""
         host = f"[{self._host}]" if ":" in self._host else self._host
-        ask = f"GET {self._path}{query} HTTP/1.0\r\nHost: {host}:{self._port}\r\n\r\n"
+        request = f"GET {self._path}{query} HTTP/1.0\r\nHost: {host}:{self._port}\r\n\r\n"
         self._sock = sock
         self._clock.watch(sock.fileno(), self._read)
         with suppress(OSError):
-            sock.send(ask.encode())  # far smaller than what the kernel takes
+            sock.send(request.encode())  # fits the kernel's buffer, so it is sent whole
 
     def _read(self) -> None:
         assert self._sock is not None
@@ -81,7 +81,7 @@ class MjpegReader:
             self._again()
 
     def _picture(self) -> bool:
-        """Take the first picture out of the data, if it is whole."""
+        """Pass on the first picture in the data; return False if it is incomplete."""
         start = self._data.find(b"\r\n\r\n")
         head = bytes(self._data[: start + 2])
         length = _LENGTH.search(head)
@@ -108,15 +108,15 @@ class MjpegReader:
             self._sock = None
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         self._is_over = True
         if self._dialling is not None:
             self._dialling.cancel()
         self._end()
 
 
-def _place_of(url: str, may_have_name: bool) -> tuple[str, int, str]:
-    """Return host, port and path of a stream; no host where a robot says what cannot be one."""
+def _parse(url: str, may_have_name: bool) -> tuple[str, int, str]:
+    """Return host, port and path of a stream; an empty host for an unusable URL."""
     try:
         parts = urlsplit(url)
         host = parts.hostname or ""

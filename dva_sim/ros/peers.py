@@ -1,4 +1,4 @@
-"""One client of a rosbridge server: what it subscribed to, may do, and does too often."""
+"""One client of a rosbridge server: its subscriptions, rights and rate limits."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"}
 
 
 class PeerHost(Protocol):
-    """Requests that a client may make of its server."""
+    """Services that a client's state needs from the server."""
 
     def now(self) -> float:
         """Return the time [s]."""
 
     def type_of(self, topic: str) -> str | None:
-        """Return the type of a topic that is served; None: there is none."""
+        """Return the type of a topic; None if it is not served."""
 
     def subscribed(self, peer: RosPeer, topic: str) -> None:
-        """Note that a client wants a topic from now on."""
+        """Handle a new subscription of a client."""
 
     def changed(self) -> None:
-        """Note that a client wants less than before."""
+        """Handle the end of a client's subscriptions."""
 
     def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
-        """Return why a command is refused; empty if it is obeyed."""
+        """Execute a command; return the reason of a refusal, or ""."""
 
     def call(self, peer: RosPeer, service: str, args: Any, answer: Callable[..., object]) -> None:
         """Call a service; `answer(ok, values)` takes the result."""
@@ -56,7 +56,7 @@ class PeerHost(Protocol):
 
 
 class PeerTopic:
-    """One subscription: time between two messages [s], and when the last one went [s]."""
+    """One subscription: minimum interval of messages [s], and time of the last one sent [s]."""
 
     def __init__(self, period: float) -> None:
         self.period = period
@@ -68,13 +68,13 @@ class RosPeer:
 
     Args:
         name: Name for people.
-        connection: To it.
-        host: Its server.
+        connection: Connection to the client.
+        host: Server of the client.
 
     Attributes:
         wants: Subscriptions of the client.
-        driver: Its device, from when it first takes control.
-        only_stops: True if the client may stop robots, and nothing else.
+        driver: Device of the client; None until it first takes control.
+        only_stops: True if the client may only stop robots.
     """
 
     def __init__(self, name: str, connection: WebSocketConnection, host: PeerHost) -> None:
@@ -90,7 +90,7 @@ class RosPeer:
         self._reported_at: dict[str, float] = {}
 
     def take(self, data: bytes) -> None:
-        """Take a message, unless too many have come; an emergency is always taken."""
+        """Handle a message, or drop it above the rate limit; emergencies are always handled."""
         if not self._has_room() and EMERGENCY not in data:
             self._drop()
             return
@@ -134,8 +134,8 @@ class RosPeer:
                 self._call(operation)
             case "unadvertise" | "status" | "set_level" | "auth":
                 pass
-            case other:
-                raise BadOperation(f"op {other[:40]!r} is not supported")
+            case unknown:
+                raise BadOperation(f"op {unknown[:40]!r} is not supported")
 
     def _subscribe(self, operation: Json) -> None:
         topic = name_in(operation, "topic")
@@ -150,7 +150,7 @@ class RosPeer:
         number_in(operation, "queue_length", 1e9)
         period = number_in(operation, "throttle_rate", 3_600_000) / 1000
         if len(self.wants) >= MAX_TOPICS:
-            raise BadOperation(f"{MAX_TOPICS} topics are all that a client may have")
+            raise BadOperation(f"a client may subscribe to at most {MAX_TOPICS} topics")
         self.wants[topic] = PeerTopic(period)
         self._host.subscribed(self, topic)
 
@@ -178,22 +178,23 @@ class RosPeer:
 
     def _call(self, operation: Json) -> None:
         service = name_in(operation, "service")
-        number = operation.get("id")
-        if number is not None and not is_finite(number):
+        call_id = operation.get("id")
+        if call_id is not None and not is_finite(call_id):
             name_in(operation, "id")
 
         def answer(ok: bool, values: Any) -> None:
             reply = {"op": "service_response", "service": service, "values": values, "result": ok}
-            self._send(reply | ({} if number is None else {"id": number}))
+            self._send(reply | ({} if call_id is None else {"id": call_id}))
 
         self._host.call(self, service, operation.get("args"), answer)
 
-    # --- what it is sent -----------------------------------------------------------------
+    # --- messages to the client ----------------------------------------------------------
 
     def offer(self, topic: str, data: bytes) -> None:
-        """Send a reading, unless it wants it later or has not taken the last ones."""
+        """Send a reading, unless it is too soon after the last one or the client lags behind."""
         subscription = self.wants.get(topic)
         now = self._host.now()
+        # The tolerance covers the rounding of times that are multiples of the period.
         if subscription is None or now < subscription.sent_at + subscription.period - 1e-6:
             return
         if self._connection.waiting <= MAX_BEHIND:
@@ -201,7 +202,7 @@ class RosPeer:
             self._connection.send(data)
 
     def say(self, what: str) -> None:
-        """Report a refusal to the client; the same one only once in a while."""
+        """Report a refusal to the client; repeat the same one only after `SAY_AGAIN`."""
         now = self._host.now()
         if now - self._reported_at.get(what, -math.inf) >= SAY_AGAIN:
             if len(self._reported_at) > MAX_TOPICS:

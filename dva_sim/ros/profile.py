@@ -31,7 +31,7 @@ class RosTopics(Config):
 
     Attributes:
         odometry: nav_msgs/Odometry; null: the pose comes from `tf`.
-        tf: tf2_msgs/TFMessage, read without odometry.
+        tf: tf2_msgs/TFMessage, read if `odometry` is null.
         battery: sensor_msgs/BatteryState.
         picture: sensor_msgs/CompressedImage, as JPEG.
         scan: sensor_msgs/LaserScan.
@@ -52,7 +52,7 @@ class RosTopics(Config):
 
 
 class RosFrames(Config):
-    """Frames that messages have to be in.
+    """Coordinate frames that messages must use.
 
     Attributes:
         odometry: `header.frame_id` of odometry, or the parent in `tf`.
@@ -64,12 +64,12 @@ class RosFrames(Config):
 
 
 class RosUnits(Config):
-    """Units of what the robot says; REP 103 has metres and radians.
+    """Units of the robot's messages; REP 103 prescribes metres and radians.
 
     Attributes:
         length: Unit of lengths and speeds.
         angle: Unit of turn rates and of the angles of scans.
-        charge: Unit of `percentage` of BatteryState, whose message says 0 to 1.
+        charge: Unit of `percentage` of BatteryState, whose definition says 0 to 1.
     """
 
     length: Literal["m", "mm"] = "m"
@@ -99,14 +99,14 @@ class RosLimits(Config):
     """Limits of a robot's commands, and the signs that it has stopped.
 
     Attributes:
-        max_speed_mps: Forward speed; commands are clamped to it.
-        max_turn_rate_rad_s: Turn rate, likewise.
+        max_speed_mps: Maximum forward speed; commands are clamped to it.
+        max_turn_rate_rad_s: Maximum turn rate; commands are clamped to it.
         max_deceleration_mps2: Deceleration with which it stops.
-        watchdog_s: A command is in force for at most this long after it has arrived.
-        max_age_s: And for at most this long after the newest tick that its sender had seen.
-        odometry_within_s: Age of the odometry beyond which the robot is stopped.
-        picture_within_s: Age of a picture beyond which none is shown.
-        stands_within_s: Time within which it has to stand once ordered to.
+        watchdog_s: Maximum time that a command is in force after its arrival.
+        max_age_s: Maximum time that it is in force after the newest tick its sender had seen.
+        odometry_within_s: Maximum age of odometry; beyond it the robot is stopped.
+        picture_within_s: Maximum age of the newest picture; beyond it none is shown.
+        stands_within_s: Time within which it must stand after a stop command.
     """
 
     max_speed_mps: Positive = 0.5
@@ -123,14 +123,14 @@ class RosProfile(Config):
     """A robot of ROS, behind a rosbridge server.
 
     Attributes:
-        ros: Version of ROS, which says how types and times are written.
+        ros: Version of ROS, which determines the spelling of types and times.
         command: Type of the velocity commands.
         command_hz: Rate at which a command in force is repeated.
         enable: Service (std_srvs/Trigger) that is called until it succeeds before the robot can be
-            driven, as motors or a server of commands may need; null: none.
-        site: Site of the DVA, whose frame positions are in.
+            driven, for example to switch on motors; null: none.
+        site: Site of the DVA; positions are in its frame.
         origin: Origin of the odometry on that site.
-        radius_m: Radius of a circle around the robot.
+        radius_m: Radius of the smallest circle around the robot.
         camera_deg: Angle of view of the camera.
         frame_hz: Rate at which observations are published.
         largest_picture_bytes: Larger pictures are dropped.

@@ -14,21 +14,21 @@ from dva_sim.agents.observation import Observation
 from dva_sim.worlds.maps import OCCUPIED, UNKNOWN, OccupancyGrid
 
 MAP: Final = "map"  # the site's frame: x east, y north; odometry does not drift, so it is odom, too
-MAX_CELLS: Final = 250_000  # design: maximum cells of the map; a larger site has larger ones
+MAX_CELLS: Final = 250_000  # design: maximum number of cells; larger sites get larger cells
 REACH_M: Final = 8.0  # range of the lidar [m]
 Json = dict[str, Any]
 
 
 def namespace_of(label: str) -> str:
-    """Return a label as ROS has names: `robot-1` is `robot_1`."""
+    """Return a label as a valid name in ROS: `robot-1` becomes `robot_1`."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", label)
     return name if name[:1].isalpha() else f"r{name}"
 
 
 def time_of(now: float) -> Json:
     """Return a time [s] as builtin_interfaces/Time."""
-    whole, rest = divmod(round(now * 1e9), 1_000_000_000)
-    return {"sec": whole, "nanosec": rest}
+    seconds, nanoseconds = divmod(round(now * 1e9), 1_000_000_000)
+    return {"sec": seconds, "nanosec": nanoseconds}
 
 
 def _header(now: float, frame: str) -> Json:
@@ -44,7 +44,7 @@ def _vector(x: float, y: float = 0.0, z: float = 0.0) -> Json:
 
 
 def odometry(name: str, observation: Observation, captured: float) -> Json:
-    """Return nav_msgs/Odometry of a robot, by one of its frames."""
+    """Return nav_msgs/Odometry of a robot from a camera frame."""
     pose = {
         "position": _vector(observation.x, observation.y),
         "orientation": _turned(observation.heading),
@@ -62,7 +62,7 @@ def odometry(name: str, observation: Observation, captured: float) -> Json:
 
 
 def transform(name: str, observation: Observation, captured: float) -> Json:
-    """Return tf2_msgs/TFMessage with one robot, by one of its frames."""
+    """Return tf2_msgs/TFMessage of a robot from a camera frame."""
     return {
         "transforms": [
             {

@@ -1,10 +1,10 @@
-"""Messages of ROS as values: checked for types, finite numbers and frames; SI and the site's frame.
+"""Values from messages of ROS, checked and converted to SI units and the site's frame.
 
-Messages are read from JSON as rosbridge writes it. `NaN` and invalid numbers come
-as null or as `NaN`; both are refused where a value is needed.
+rosbridge writes NaN and infinity into JSON as null or `NaN`; both are refused where a value is
+needed.
 
 References:
-    REP 103 (units and frames), REP 117 (ranges that are none); definitions of nav_msgs,
+    REP 103 (units and frames), REP 117 (ranges without a valid distance); definitions of nav_msgs,
     geometry_msgs, sensor_msgs and tf2_msgs.
 """
 
@@ -29,7 +29,7 @@ FARTHEST: Final = 100_000.0  # design: greatest distance of a robot from its ori
 
 
 class BadReading(Exception):
-    """A message that says nothing of use, and why."""
+    """An unusable message, with the reason."""
 
 
 class RosMotion(NamedTuple):
@@ -51,7 +51,7 @@ def number(value: Any, what: str) -> float:
     """Return a finite number.
 
     Raises:
-        BadReading: it is none.
+        BadReading: the value is not a finite number.
     """
     if not is_finite(value):
         raise BadReading(f"{what} is {_shown(value)}, not a finite number")
@@ -62,7 +62,7 @@ def part(message: Any, *path: str) -> Any:
     """Return the value at a path of keys.
 
     Raises:
-        BadReading: it is not there.
+        BadReading: the path does not exist.
     """
     for key in path:
         if not isinstance(message, Mapping) or key not in message:
@@ -76,21 +76,25 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-def stamp_of(message: Any) -> float | None:
+def read_stamp(message: Any) -> float | None:
     """Return the time in a header, of ROS 1 or 2 [s]; None if it is zero or missing."""
     stamp = message.get("header", {}).get("stamp") if isinstance(message, Mapping) else None
     if not isinstance(stamp, Mapping):
         return None
-    whole = stamp.get("sec", stamp.get("secs"))
-    rest = stamp.get("nanosec", stamp.get("nsecs"))
-    if not isinstance(whole, int) or not isinstance(rest, int) or not (whole or rest):
+    seconds = stamp.get("sec", stamp.get("secs"))
+    nanoseconds = stamp.get("nanosec", stamp.get("nsecs"))
+    if (
+        not isinstance(seconds, int)
+        or not isinstance(nanoseconds, int)
+        or not (seconds or nanoseconds)
+    ):
         return None
-    if not 0 <= whole < LATEST or not 0 <= rest < 1e9:
+    if not 0 <= seconds < LATEST or not 0 <= nanoseconds < 1e9:
         return None
-    return whole + rest * 1e-9
+    return seconds + nanoseconds * 1e-9
 
 
-def yaw_of(rotation: Any) -> float:
+def read_yaw(rotation: Any) -> float:
     """Return the heading in a quaternion [rad].
 
     Raises:
@@ -129,15 +133,15 @@ class RosReader:
         if abs(speed) > FASTEST or abs(turn) > FASTEST:
             raise BadReading(f"{speed:g} m/s and {turn:g} rad/s are beyond any robot")
         return RosMotion(
-            x, y=y, heading=heading, speed=speed, turn_rate=turn, stamp=stamp_of(message)
+            x, y=y, heading=heading, speed=speed, turn_rate=turn, stamp=read_stamp(message)
         )
 
     def transform(self, message: Any, before: RosMotion | None) -> RosMotion | None:
-        """Return the motion by tf2_msgs/TFMessage; None if the robot is not in it.
+        """Return the motion in a tf2_msgs/TFMessage; None if it lacks the robot.
 
         Args:
-            message: Transforms, of which one may be of the robot.
-            before: The motion by the one before, from which speeds follow.
+            message: Transforms, one of which may concern the robot.
+            before: Motion at the previous transform, to compute speeds from.
 
         Raises:
             BadReading: it is not as it should be.
@@ -150,14 +154,14 @@ class RosReader:
             ends = part(each, "header", "frame_id"), part(each, "child_frame_id")
             if tuple(_bare(end) for end in ends) == (_bare(frames.odometry), _bare(frames.base)):
                 place = self._placed(part(each, "transform"), "translation", "rotation")
-                return _moved(before, *place, stamp_of(each))
+                return _moved(before, *place, read_stamp(each))
         return None
 
     def charge(self, message: Any) -> float:
-        """Return the share of charge that sensor_msgs/BatteryState says is left.
+        """Return the state of charge in a sensor_msgs/BatteryState, 0 to 1.
 
         Raises:
-            BadReading: it does not say.
+            BadReading: it has no state of charge.
         """
         share = number(part(message, "percentage"), "percentage")
         share /= 100.0 if self._profile.units.charge == "percent" else 1.0
@@ -174,9 +178,9 @@ class RosReader:
         data = part(message, "data")
         if not isinstance(data, str):
             raise BadReading(f"data is {_shown(type(data).__name__)}, not base64")
-        most = self._profile.largest_picture_bytes
-        if len(data) * 3 // 4 > most + 3:
-            raise BadReading(f"{len(data) * 3 // 4} bytes; at most {most} are taken")
+        size_limit = self._profile.largest_picture_bytes
+        if len(data) * 3 // 4 > size_limit + 3:
+            raise BadReading(f"{len(data) * 3 // 4} bytes; at most {size_limit} are taken")
         try:
             picture = base64.b64decode(data, validate=True)
         except (binascii.Error, ValueError):
@@ -194,15 +198,15 @@ class RosReader:
         units = self._profile.units
         first = number(part(message, "angle_min"), "angle_min") * units.radians
         step = number(part(message, "angle_increment"), "angle_increment") * units.radians
-        most = number(part(message, "range_max"), "range_max") * units.metres
+        range_max = number(part(message, "range_max"), "range_max") * units.metres
         ranges = part(message, "ranges")
         if not isinstance(ranges, list) or not 0 < len(ranges) <= MAX_RANGES:
             raise BadReading(f"ranges is not a list of 1 to {MAX_RANGES}")
-        if not 0.0 < most < FARTHEST:
-            raise BadReading(f"range_max {most:g} m is no range")
+        if not 0.0 < range_max < FARTHEST:
+            raise BadReading(f"range_max {range_max:g} m is no range")
         if max(abs(first), abs(step)) > MAX_ANGLE:
             raise BadReading(f"angles of {first:g} and {step:g} rad are none")
-        nearest = [most] * RAYS
+        nearest = [range_max] * RAYS
         for index, value in enumerate(ranges):
             near = 0.0 if value == -math.inf else value  # REP 117: too close to be measured
             if is_finite(near) and near >= 0.0:
@@ -222,7 +226,7 @@ class RosReader:
         x, y = (number(part(pose, place, key), f"{place}.{key}") * scale for key in "xy")
         if math.hypot(x, y) > FARTHEST:
             raise BadReading(f"{math.hypot(x, y):g} m from the origin is beyond any site")
-        heading = yaw_of(part(pose, rotation)) + self._turn
+        heading = read_yaw(part(pose, rotation)) + self._turn
         east = self._origin[0] + self._cos * x - self._sin * y
         return east, self._origin[1] + self._sin * x + self._cos * y, heading
 
@@ -234,7 +238,11 @@ def _bare(frame: Any) -> str:
 def _moved(
     before: RosMotion | None, x: float, y: float, heading: float, stamp: float | None
 ) -> RosMotion:
-    """Return a motion by two places; without times, or with the same time twice, speeds stay."""
+    """Return the motion between two poses.
+
+    Raises:
+        BadReading: the times do not increase.
+    """
     if before is None:
         return RosMotion(x, y, heading, speed=0.0, turn_rate=0.0, stamp=stamp)
     if stamp is None or before.stamp is None or stamp <= before.stamp:

@@ -1,4 +1,4 @@
-"""A robot of ROS as a device of the DVA: the usual decider, bound to a rosbridge server."""
+"""A ROS robot as a device of the DVA: the usual robot controller behind a rosbridge server."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ PICTURES_MS: Final = 50  # design: shortest interval between two pictures [ms]
 SMALL: Final = 100_000  # design: maximum size of a message other than a picture or a scan [B]
 SCANS: Final = 1_000_000  # design: maximum size of a scan [B]
 TELL_AGAIN: Final = 10.0  # design: shortest interval between two reports of one refused topic [s]
-ENABLE_AGAIN: Final = 2.0  # design: pause after a refusal [s]
+ENABLE_AGAIN: Final = 2.0  # design: pause before calling a refused enable service again [s]
 SENSOR_HZ: Final = 10.0
-RANGE_M: Final = 12.0  # assumed: range of the camera; nothing in its pictures is recognised
+RANGE_M: Final = 12.0  # assumed: range of the camera; no objects are recognised in its pictures
 
 
 class RosRobot:
     """One robot.
 
     Args:
-        stage: Stage on which its device is made, and the site of its positions.
+        stage: Stage on which its device is made; positions are in the frame of its site.
         number: Number of the robot.
         profile: Profile of the connection.
         url: Address of the rosbridge server.
@@ -46,7 +46,7 @@ class RosRobot:
 
     Attributes:
         agent: Agent that obeys the DVA and the driver.
-        bridge: To its rosbridge server.
+        bridge: Client of its rosbridge server.
         on_picture: Callback for each picture, as JPEG.
     """
 
@@ -77,12 +77,12 @@ class RosRobot:
             on_change=self._bridge_changed,
             on_bad=self._refused,
         )
-        self.agent = self._made(number)
+        self.agent = self._make_agent(number)
         self.agent.unfit = NO_ODOMETRY
         self.agent.takes_missions = False
         clock.every(LOOK, self._look)
 
-    def _made(self, number: int) -> RobotAgent:
+    def _make_agent(self, number: int) -> RobotAgent:
         stage = self._stage
         profile = self._profile
         limits = self._profile.limits
@@ -132,7 +132,7 @@ class RosRobot:
         angle = math.radians(profile.camera_deg)
         return RobotSetup(
             pattern=stage.pattern(),
-            service=lambda: 0.0,  # this computer is no model of one
+            service=lambda: 0.0,  # processing takes real time here, so none is simulated
             frame_rate=profile.frame_hz,
             frame_bytes=stage.scenario.camera.frame_bytes,
             view=FieldOfView(angle, RANGE_M, stage.planner.line_of_sight, hazy=lambda: False),
@@ -145,29 +145,31 @@ class RosRobot:
         profile = self._profile
         topics = self._profile.topics
         name = partial(profile.topic, self._namespace)
-        kind = profile.type_name
-        sensor = partial(kind, "sensor_msgs")
-        picture = 4 * profile.largest_picture_bytes // 3 + 1000  # as base64
+        type_name = profile.type_name
+        sensor_type = partial(type_name, "sensor_msgs")
+        picture = 4 * profile.largest_picture_bytes // 3 + 1000  # base64 adds a third
         subscriptions = {
-            topics.battery: Subscribed(sensor("BatteryState"), self._on_battery, SMALL),
+            topics.battery: Subscribed(sensor_type("BatteryState"), self._on_battery, SMALL),
             topics.picture: Subscribed(
-                sensor("CompressedImage"), self._on_picture, picture, PICTURES_MS
+                sensor_type("CompressedImage"), self._on_picture, picture, PICTURES_MS
             ),
             topics.scan: Subscribed(
-                sensor("LaserScan"), self._on_scan, SCANS, int(1000 / SENSOR_HZ)
+                sensor_type("LaserScan"), self._on_scan, SCANS, int(1000 / SENSOR_HZ)
             ),
         }
         if topics.odometry is not None:
-            kind_of = kind("nav_msgs", "Odometry")
+            odometry_type = type_name("nav_msgs", "Odometry")
             subscriptions[topics.odometry] = Subscribed(
-                kind_of, self._on_odometry, SMALL, ODOMETRY_MS
+                odometry_type, self._on_odometry, SMALL, ODOMETRY_MS
             )
         else:
-            subscriptions[topics.tf] = Subscribed(kind("tf2_msgs", "TFMessage"), self._on_tf, SMALL)
+            subscriptions[topics.tf] = Subscribed(
+                type_name("tf2_msgs", "TFMessage"), self._on_tf, SMALL
+            )
         return {name(topic): each for topic, each in subscriptions.items() if topic is not None}
 
     def begin(self) -> None:
-        """Connect to the bridge; the robot registers once its odometry is as it should be."""
+        """Connect to the bridge; the robot registers once its odometry is valid and fresh."""
         self.bridge.connect()
 
     def close(self) -> None:
@@ -175,7 +177,7 @@ class RosRobot:
         self.body.stand()
         self.bridge.close()
 
-    # --- what the robot says -------------------------------------------------------------
+    # --- messages from the robot ---------------------------------------------------------
 
     def _on_odometry(self, message: Any) -> None:
         self._move(self._reader.odometry, message)
@@ -218,7 +220,7 @@ class RosRobot:
         self.on_picture(picture)
 
     def _refused(self, topic: str, why: str) -> None:
-        """Count a refused message; report the same refusal only once in a while."""
+        """Count a refused message; report the same refusal only every `TELL_AGAIN`."""
         device = self.agent.device
         now = self._clock.now
         device.recorder.counters[f"refused from the robot: {topic or 'a message'}"] += 1
@@ -226,7 +228,7 @@ class RosRobot:
             self._reported_at[topic] = now
             device.tell(f"{topic or 'a message'} refused: {why}", "link")
 
-    # --- what it is told ----------------------------------------------------------------
+    # --- messages to the robot ---------------------------------------------------------
 
     def _send(self, speed: float, turn_rate: float) -> bool:
         units = self._profile.units
@@ -236,13 +238,13 @@ class RosRobot:
         }
         if self._profile.command == "Twist":
             return self.bridge.publish(self._command, twist)
-        # A stamp of zero: this clock is not the robot's.
+        # Zero means "no time": the robot's clock is unknown here.
         names = ("secs", "nsecs") if self._profile.ros == 1 else ("sec", "nanosec")
         stamp = dict.fromkeys(names, 0)
         header = {"stamp": stamp, "frame_id": self._profile.frames.base}
         return self.bridge.publish(self._command, {"header": header, "twist": twist})
 
-    # --- whether it can be driven ---------------------------------------------------------
+    # --- readiness for driving -----------------------------------------------------------
 
     def _bridge_changed(self, why: str) -> None:
         if why:
@@ -250,7 +252,7 @@ class RosRobot:
         else:
             self.fitness.connected()
             self.agent.device.tell("is connected to its bridge", "link")
-            self.body.stand()  # whatever it was told before the bridge was lost
+            self.body.stand()  # cancels commands from before the bridge was lost
             self._enable()
         self._look()
 
@@ -280,7 +282,7 @@ class RosRobot:
         if problem and problem != agent.unfit:
             self._withdraw(problem)
         elif not problem and agent.unfit:
-            self._return()
+            self._return_to_service()
         if self.fitness.needs_another_bridge(now):
             self.bridge.renew("odometry stays late")
 
@@ -292,7 +294,7 @@ class RosRobot:
             return
         self.agent.withdraw(problem)
 
-    def _return(self) -> None:
+    def _return_to_service(self) -> None:
         self.agent.return_to_service()
         if not self._is_registered:
             self._is_registered = True
@@ -300,7 +302,7 @@ class RosRobot:
             self._check_place()
 
     def _check_place(self) -> None:
-        """Say so if the robot stands beside the site: the profile's origin may be wrong."""
+        """Report a robot outside of the site: the profile's origin may be wrong."""
         west, south, east, north = self._stage.site.extent
         x = self.body.x
         y = self.body.y

@@ -14,7 +14,7 @@ MAX_NAME: Final = 256  # maximum characters of the name of a topic, a service or
 
 
 class BadOperation(Exception):
-    """A message that is no operation of the protocol, and why."""
+    """A message that is not an operation of the protocol, with the reason."""
 
 
 def encode(operation: dict[str, Any]) -> bytes:
@@ -30,7 +30,7 @@ def decode(data: bytes) -> dict[str, Any]:
     """Return the operation in a message.
 
     Raises:
-        BadOperation: there is none.
+        BadOperation: the message is not an operation.
     """
     try:
         operation = json.loads(data)
@@ -42,7 +42,7 @@ def decode(data: bytes) -> dict[str, Any]:
 
 
 def is_finite(value: Any) -> bool:
-    """Return True for a number, and no truth value, that is finite as a float."""
+    """Return True for a number that is finite as a float; Booleans are not numbers."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -63,19 +63,19 @@ def name_in(operation: dict[str, Any], key: str) -> str:
     return name
 
 
-def number_in(operation: dict[str, Any], key: str, most: float) -> float:
-    """Return a number from 0 to `most`; 0 if it is missing.
+def number_in(operation: dict[str, Any], key: str, maximum: float) -> float:
+    """Return a number from 0 to `maximum`; 0 if it is missing.
 
     Raises:
-        BadOperation: it is no such number.
+        BadOperation: it is not a number in this range.
     """
     value = operation.get(key, 0)
-    if not is_finite(value) or not 0 <= value <= most:
-        raise BadOperation(f"{operation['op']} has {key} {str(value)[:40]!r}: 0 to {most:g}")
+    if not is_finite(value) or not 0 <= value <= maximum:
+        raise BadOperation(f"{operation['op']} has {key} {str(value)[:40]!r}: 0 to {maximum:g}")
     return float(value)
 
 
 def plain_type(name: str) -> str:
     """Return a type as ROS 1 writes it: `geometry_msgs/msg/Twist` is `geometry_msgs/Twist`."""
-    package, _, rest = name.partition("/")
-    return f"{package}/{rest.removeprefix('msg/').removeprefix('srv/')}"
+    package, _, type_name = name.partition("/")
+    return f"{package}/{type_name.removeprefix('msg/').removeprefix('srv/')}"

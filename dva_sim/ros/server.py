@@ -29,10 +29,10 @@ MAX_CONNECTIONS: Final = 64  # design: maximum connections, including those with
 STOPS = 1  # rank of a client that may only stop robots
 DOES_ALL = 2  # rank of a client with all rights
 PING: Final = 2.0  # design: interval between two pings [s]
-SILENT: Final = 5.0  # design: a client without even a pong for this long is cut [s]
+SILENT: Final = 5.0  # design: silence, pongs included, after which a client is cut [s]
 SWEEP: Final = 1.0  # design: interval of checks for silent connections [s]
 LARGEST: Final = 100_000  # design: maximum size of a client's message; a Twist has 200 [B]
-CLOCK_PERIOD: Final = 0.1  # interval of published times [s]
+CLOCK_PERIOD: Final = 0.1  # interval of messages on /clock [s]
 TYPES: Final = {
     "odom": "nav_msgs/Odometry",
     "scan": "sensor_msgs/LaserScan",
@@ -59,14 +59,14 @@ ROSAPI: Final = {
 
 
 class RosbridgeServer:
-    """Serves the robots that a gateway hears.
+    """Serves the robots of a gateway.
 
     Args:
         clock: Polls the sockets.
         port: Port to serve.
         gateway: The robots.
-        site: For the map.
-        tell: Adds a line to the story.
+        site: Site whose map is served.
+        tell: Function that adds a line to the story of the run.
     """
 
     def __init__(
@@ -165,21 +165,21 @@ class RosbridgeServer:
             self._admit(peer, slot)
 
     def _admit(self, peer: RosPeer, slot: PortConnection) -> None:
-        """Give a client with a token its rank; those beyond the limit may still stop robots."""
-        others = [each for each in self._peers.values() if each is not None and each is not peer]
-        peer.only_stops = sum(not each.only_stops for each in others) >= MAX_PEERS
+        """Set the rank of a client with a token; those beyond the limit may only stop robots."""
+        peers = [each for each in self._peers.values() if each is not None and each is not peer]
+        peer.only_stops = sum(not each.only_stops for each in peers) >= MAX_PEERS
         rank = STOPS if peer.only_stops else DOES_ALL
         slot.begin(rank, self._clock.now, is_limited=not peer.only_stops)
         self.tell(f"{peer.name} has come{', and may only stop robots' if peer.only_stops else ''}")
 
     def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
-        """Return why a client is not let in: a foreign name or page, or no token."""
+        """Return status and reason of refusing a client: a foreign name or page, or no token."""
         headers = request.headers
         try:
             facts = RequestFacts(headers.get("Host", ""), headers.get("Origin"), changes=True)
             query = urlsplit(request.path).query
             bearer = headers.get("Authorization", "")
-        except (ValueError, LookupError):  # LookupError: a header that is there twice
+        except (ValueError, LookupError):  # LookupError: a repeated header
             return HTTPStatus.BAD_REQUEST, "the address or the headers make no sense\n"
         refusal = self._admission.refusal(facts, query, bearer)
         return None if refusal is None else (HTTPStatus(refusal[0]), f"{refusal[1]}\n")
@@ -201,13 +201,13 @@ class RosbridgeServer:
         self.changed()
 
     def close(self) -> None:
-        """End all connections; what clients drove is stopped."""
+        """End all connections, and stop the robots that clients drove."""
         self._clock.unwatch(self._listener.fileno())
         self._listener.close()
         for connection in list(self._peers):
             connection.close(reason="the run is over")
 
-    # --- what there is -------------------------------------------------------------------
+    # --- topics and services ------------------------------------------------------------
 
     def topics(self) -> dict[str, str]:
         """Return all topics with their types."""
@@ -226,9 +226,9 @@ class RosbridgeServer:
         return of_robots | ROSAPI
 
     def type_of(self, topic: str) -> str | None:
-        """Return the message type of a topic; for a robot that may still come, its future type."""
-        name, _, rest = topic.lstrip("/").partition("/")
-        return SHARED.get(topic) or (TYPES.get(rest) if name else None)
+        """Return the message type of a topic, also for robots that have not registered yet."""
+        name, _, topic_name = topic.lstrip("/").partition("/")
+        return SHARED.get(topic) or (TYPES.get(topic_name) if name else None)
 
     def subscribed(self, peer: RosPeer, topic: str) -> None:
         """Handle a client's subscription to a topic."""
@@ -238,7 +238,7 @@ class RosbridgeServer:
             peer.offer(topic, self._map)
 
     def changed(self) -> None:
-        """See `PeerHost`: subscribe to the topics of robots that clients asked for."""
+        """Subscribe to exactly the robots' topics that clients want."""
         topics = {
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }
@@ -251,7 +251,7 @@ class RosbridgeServer:
             )
 
     def _tick(self) -> None:
-        self.changed()  # robots may have come
+        self.changed()  # robots may have registered
         self._send("/clock", lambda: published.clock(self._clock.now))
 
     # --- readings ------------------------------------------------------------------------
@@ -273,7 +273,7 @@ class RosbridgeServer:
         self._send(f"/{name}/image/compressed", lambda: published.picture(name, jpeg, captured))
 
     def _send(self, topic: str, make: Callable[[], Json]) -> None:
-        """Send a message to all who want it; without any it is not made."""
+        """Send a message to all subscribers; without subscribers it is not made."""
         peers = [p for p in self._peers.values() if p is not None and topic in p.wants]
         if peers:
             data = self._packed(topic, make())
@@ -287,10 +287,10 @@ class RosbridgeServer:
     # --- control -------------------------------------------------------------------------
 
     def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
-        """Drive a robot for a client; returns the reason if it is refused."""
-        name, _, rest = topic.lstrip("/").partition("/")
+        """Drive a robot for a client; return the reason of a refusal, or ""."""
+        name, _, topic_name = topic.lstrip("/").partition("/")
         robot = self._gateway.robots.get(name)
-        if rest != "cmd_vel" or robot is None:
+        if topic_name != "cmd_vel" or robot is None:
             return "no robot has this topic; see /rosapi/topics"
         if peer.driver is None:
             return "it is not yours: call take_control first"

@@ -1,4 +1,4 @@
-"""WebSocket connections in the thread of a run, which none of them blocks before it ends.
+"""WebSocket connections in the thread of a run, which they block only at its end.
 
 The clock of the run polls the sockets. Bytes that the kernel does not take wait in a buffer of
 bounded size; a peer that lets it fill up is disconnected.
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from websockets.server import ServerProtocol
 
 FLUSH: Final = 0.01  # design: interval between two attempts to send waiting data [s]
-READ_BYTES: Final = 1 << 16  # design: maximum read before other sources have their turn [B]
+READ_BYTES: Final = 1 << 16  # design: maximum read per turn of a connection [B]
 MAX_WAITING: Final = 8_000_000  # design: maximum data waiting for a peer [B]
-LINGERS: Final = 0.5  # design: time for a bridge to read the last commands of a run [s]
-SHAKES_WITHIN: Final = 5.0  # design: time from TCP to WebSocket [s]
+LINGERS: Final = 0.5  # design: maximum wait for a bridge to read a run's last commands [s]
+SHAKES_WITHIN: Final = 5.0  # design: time for the WebSocket handshake [s]
 NORMAL = 1000  # close code of RFC 6455
 TOO_SLOW = 1008  # close code of RFC 6455
 GOING = 1001  # close code of RFC 6455
@@ -32,12 +32,12 @@ PORT: Final = 9090  # default port of rosbridge
 
 
 class WebSocketConnection:
-    """One end of an open TCP connection that speaks, or is about to speak, WebSocket.
+    """One end of a WebSocket, from the TCP connection on.
 
     Args:
         clock: Polls the socket.
-        sock: Connected, not blocking.
-        protocol: The state of this end.
+        sock: Connected, non-blocking socket.
+        protocol: State machine of the protocol at this end.
         on_text: Callback for each whole text message.
         on_end: Callback once, with the reason, when the connection is over.
 
@@ -82,29 +82,28 @@ class WebSocketConnection:
         return len(self._buffer)
 
     def send(self, text: bytes) -> None:
-        """Send a text message, as UTF-8; nothing once either end has said good-bye."""
+        """Send a text message in UTF-8; do nothing once either end has begun to close."""
         if self.is_open and self._protocol.state.name == "OPEN":
             self._protocol.send_text(text)
             self.push()
 
     def ping(self) -> None:
-        """Ask for a sign of life, which every peer gives by itself."""
+        """Ping the peer, whose library replies by itself."""
         if self.is_open and self._protocol.state.name == "OPEN":
             self._protocol.send_ping(b"")
             self.push()
 
     def close(self, code: int = NORMAL, reason: str = "", *, linger: float = 0.0) -> None:
-        """Say good-bye and end the connection.
+        """Send a close frame and end the connection.
 
         Args:
             code: Close code.
-            reason: Why, for the peer.
-            linger: So long the peer may take to read what it was sent last [s]; nothing else
-                happens meanwhile.
+            reason: Reason, for the peer.
+            linger: Maximum time for the peer to read the last data [s]; blocks meanwhile.
         """
         if not self.is_open:
             return
-        if self._protocol.state.name == "OPEN":  # a handshake that never ended has no close frame
+        if self._protocol.state.name == "OPEN":  # an unfinished handshake has no close frame
             self._protocol.send_close(code, reason[:120])
             self.push()
             if linger and self.is_open:
@@ -112,9 +111,10 @@ class WebSocketConnection:
         self.end(reason)
 
     def _linger(self, linger: float) -> None:
-        """Read until the peer has closed; a socket closed with bytes unread is reset.
+        """Read until the peer has closed.
 
-        Then what was sent last, such as a command to stand, would be lost on its way.
+        Closing a socket with unread bytes resets the connection, and the last data, such as a
+        command to stand, would be lost.
         """
         until = time.monotonic() + linger
         with suppress(OSError):
@@ -123,8 +123,8 @@ class WebSocketConnection:
                 self._sock.settimeout(linger)
                 self._sock.sendall(self._buffer)
             self._sock.shutdown(socket.SHUT_WR)
-            while (left := until - time.monotonic()) > 0.0:
-                self._sock.settimeout(left)
+            while (remaining := until - time.monotonic()) > 0.0:
+                self._sock.settimeout(remaining)
                 if not self._sock.recv(READ_BYTES):
                     return
 
@@ -208,7 +208,7 @@ class WebSocketUrl:
     """Address of a WebSocket server, `ws://HOST:PORT/PATH`.
 
     Raises:
-        ConfigError: it is none, in one line.
+        ConfigError: the text is not such an address.
     """
 
     def __init__(self, text: str, option: str) -> None:
@@ -233,13 +233,13 @@ class WebSocketDialer:
     Args:
         clock: Polls the socket.
         url: Address of the server.
-        largest: Size of the largest message that is read [B].
+        largest: Maximum size of a message [B].
         on_open: Callback when the handshake is done.
         on_text: Callback for each text message.
         on_end: Callback once, when the connection is over or could not be made.
 
     Attributes:
-        connection: Once TCP has connected.
+        connection: The connection; None until TCP has connected.
     """
 
     def __init__(
