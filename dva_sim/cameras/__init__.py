@@ -1,6 +1,6 @@
-"""Pictures of simulated robots' cameras: drawn beside the run, and streamed to any player.
+"""Pictures of simulated robots' cameras, drawn outside of the run's process and streamed by HTTP.
 
-The run's process notes which frames were taken (`screens`); another process draws those that
-somebody watches (`painting`, `drawing`), and they are served by HTTP (`streams`, `streaming`). No
-process waits for another one (`pipes`).
+The run's process notes which frames were taken (`screens`); another process draws those that have
+viewers (`painting`, `drawing`) and serves them (`streams`, `streaming`). No process waits for
+another.
 """

@@ -1,6 +1,6 @@
 """The process that draws and serves the pictures of a run: `python -m dva_sim.cameras --fd N ...`.
 
-It ends when its socket to the run does. Drawing has a thread; serving has the main one.
+It ends when its socket to the run closes. Drawing has its own thread; serving runs in the main one.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ NOT_KEPT = {"Cache-Control": "no-store"}
 
 
 class CameraPages:
-    """The addresses that are served.
+    """The HTTP handlers of streams and single pictures.
 
     Args:
-        streams: The pictures.
+        streams: Source of the pictures.
         labels: Labels of the robots, in the order of their numbers.
     """
 
@@ -55,7 +55,7 @@ class CameraPages:
             return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
         viewer = self._streams.admit(robot, CLIENT)
         if viewer is None:
-            raise HTTPException(503, f"{MAX_VIEWERS} viewers are looking already")
+            raise HTTPException(503, f"all {MAX_VIEWERS} places for viewers are taken")
         return PictureStream(self._streams.stream(viewer), partial(self._streams.leave, viewer))
 
     async def still(self, request: Request) -> Response:
@@ -89,7 +89,7 @@ async def _serve(world: int, listener: socket.socket, host: str, labels: Sequenc
     painter, ours = socket.socketpair()
 
     def watch(robots: list[int], _: bool) -> None:
-        """Say to the run, and to who draws, which robots are watched."""
+        """Send the watched robots to the run and to the drawing thread."""
         for end in (to_world, pictures):
             end.offer(json.dumps({"watch": robots}).encode() + b"\n")
 
@@ -118,7 +118,7 @@ async def _serve(world: int, listener: socket.socket, host: str, labels: Sequenc
     ]
     app = Starlette(routes=routes, exception_handlers={HTTPException: _refused})
     closing = asyncio.ensure_future(_close_when(ended, streams))
-    # Pictures have no token: their address goes to all devices, by messages of the DVA.
+    # Pictures have no token: all devices may see them, and get their address from the DVA.
     guarded = PortGuard(app, Admission(own_names(host, any_port=True)))
     server = Server.of(guarded, MAX_REQUEST, ws="none")
     await serve(server, listener, fitting_places(1), ended)
@@ -140,7 +140,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--host", required=True, help="host that it listens on")
     parser.add_argument("--labels", type=json.loads, required=True, help="of the robots, as JSON")
     options = parser.parse_args(words)
-    # Ctrl-C may reach all processes; the run says when it is over.
+    # Ctrl-C may reach all processes, but the run decides when to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
     listener = socket.socket(fileno=options.listen_fd)

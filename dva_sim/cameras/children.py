@@ -1,4 +1,4 @@
-"""The processes beside the world, which are spoken with by lines."""
+"""Child processes of a run that exchange lines with it through a pipe."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from collections.abc import Sequence
 from dva_sim.serving.pipes import LineKinds, LinePipe
 from dva_sim.serving.processes import Child
 
-END_SOON = 0.8  # time for a process to end by itself, for which the world waits [s]
-# Lines for the process that draws pictures.
+END_SOON = 0.8  # time for a process to end by itself, while the run waits [s]
+# Kinds of lines for the process that draws pictures.
 PAINTED = LineKinds(
     newest=frozenset({"frame", "picture"}), kept=frozenset({"scene", "contain", "ready"})
 )
 
 
 class PipedChild(Child):
-    """A process with a pipe to it, by whose end it ends, whatever happens to us.
+    """A child process that ends when its pipe closes, even if this process is killed.
 
     Args:
         name: Name for people.
         module: Module to run.
-        words: Its further arguments.
-        others: Sockets that it gets beside its pipe.
-        kinds: The kinds of lines that are sent to it.
+        words: Further arguments of the command line.
+        sockets: Sockets that it inherits, besides its pipe.
+        kinds: Kinds of the lines that are sent to it.
 
     Attributes:
-        pipe: Our end.
+        pipe: This process's end of the pipe.
     """
 
     def __init__(
@@ -35,12 +35,12 @@ class PipedChild(Child):
         name: str,
         module: str,
         words: Sequence[str],
-        others: Sequence[socket.socket],
+        sockets: Sequence[socket.socket],
         kinds: LineKinds,
     ) -> None:
-        ours, theirs = socket.socketpair()
-        self.pipe = LinePipe(ours.detach(), kinds)
-        with theirs:
-            called = [sys.executable, "-m", module, "--fd", str(theirs.fileno()), *words]
-            files = [file.fileno() for file in (theirs, *others)]
+        near, far = socket.socketpair()
+        self.pipe = LinePipe(near.detach(), kinds)
+        with far:
+            called = [sys.executable, "-m", module, "--fd", str(far.fileno()), *words]
+            files = [file.fileno() for file in (far, *sockets)]
             super().__init__(name, called, self.pipe.close, pass_fds=files)

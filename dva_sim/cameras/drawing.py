@@ -1,7 +1,7 @@
 """Camera pictures of robots, drawn from the true state when each frame was taken.
 
-The site and the hazards are built from the scenario and its seed by the same functions as those of
-the run, so that a frame needs no more than a pose and who was near.
+Site and hazards are built from the scenario and its seed by the same functions as in the run, so
+that a frame consists only of a pose and the figures nearby.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Eyes:
         seed: Random seed of the run.
 
     Attributes:
-        rate: Frames of a robot in a second of the run [1/s].
+        rate: Frame rate of a robot, in virtual time [1/s].
     """
 
     def __init__(self, scenario: Mapping[str, Any], seed: int) -> None:
@@ -52,7 +52,7 @@ class Eyes:
         self._real = [n for n, incident in enumerate(self._incidents) if not incident.false_alarm]
         hazards = [self._incidents[number].hazard for number in self._real]
         self._surroundings = Surroundings(site, hazards)
-        self._shown = {what for hazard in hazards for what in hazard.shows}
+        self._visible = {what for hazard in hazards for what in hazard.shows}
         self._contained: dict[int, float] = {}
         self._air: dict[str, tuple[float, Raster | None]] = {}
         self._encoder = Encoder(run.camera.frame_bytes)
@@ -76,55 +76,55 @@ class Eyes:
         ]
         pixels = self._camera.picture(
             Pose(*frame["pose"]),
-            [figure_of(*row) for row in frame["figures"]],
+            [make_figure(*row) for row in frame["figures"]],
             hazards,
             self._smoke(time),
-            self._seen("water", time),
+            self._raster("water", time),
             time,
         )
         return self._encoder.encode(Image.fromarray(pixels))
 
     def _smoke(self, time: float) -> SmokeView | None:
-        mean = self._seen("smoke", time)
-        layer = None if mean is None else self._seen("layer", time)
+        mean = self._raster("smoke", time)
+        layer = None if mean is None else self._raster("layer", time)
         return None if mean is None or layer is None else SmokeView(mean, layer)
 
-    def _seen(self, what: str, time: float) -> Raster | None:
-        """Return the smoke or water, if there is any to be seen; worked out once for all robots."""
-        if ("smoke" if what == "layer" else what) not in self._shown:
+    def _raster(self, what: str, time: float) -> Raster | None:
+        """Return visible smoke or water, computed once for all robots; None if there is none."""
+        if ("smoke" if what == "layer" else what) not in self._visible:
             return None
         tick = math.floor(time / AIR_S) * AIR_S
-        drawn = self._air.get(what)
-        if drawn is None or drawn[0] != tick:
+        cached = self._air.get(what)
+        if cached is None or cached[0] != tick:
             raster = self._surroundings.raster(what, tick)
-            drawn = tick, raster if float(raster.values.max(initial=0.0)) > HAZE else None
-            self._air[what] = drawn
-        return drawn[1]
+            cached = tick, raster if float(raster.values.max(initial=0.0)) > HAZE else None
+            self._air[what] = cached
+        return cached[1]
 
 
-def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
+def make_figure(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
     """Return the figure of a person or robot near the camera."""
     return Figure(kind, x, y, heading, number=index, lying=activity == INCAPACITATED)
 
 
 class Encoder:
-    """JPEGs of about as many bytes as the frames of a run have.
+    """Encodes JPEGs of about the same size as the run's modelled frames.
 
     Args:
-        most: Bytes of a frame; pictures stay below it if they can.
+        limit: Size of a frame [B]; pictures stay below it where their quality allows.
     """
 
-    def __init__(self, most: int) -> None:
-        self._most = most
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
         self.quality = BEST
 
     def encode(self, image: Image.Image) -> bytes:
-        """Return a picture at the quality that suits; after a change of scene it is tried again."""
+        """Return a picture as JPEG; encode it again while it is too large, at a lower quality."""
         data = self._at(image, self.quality)
-        while len(data) > self._most and self.quality > WORST:
+        while len(data) > self._limit and self.quality > WORST:
             self.quality = max(WORST, self.quality - 10)
             data = self._at(image, self.quality)
-        if len(data) < 0.7 * self._most:
+        if len(data) < 0.7 * self._limit:
             self.quality = min(BEST, self.quality + 1)
         return data
 

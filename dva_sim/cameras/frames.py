@@ -1,4 +1,4 @@
-"""Pictures on their way from the process that draws them to the one that serves them.
+"""Pictures in transit from the drawing thread to the server.
 
 A record is the length of a header (4 bytes, big-endian), the header as JSON, and a JPEG of as many
 bytes as the header says. The renderer may die in the middle of a record and begin again on the
@@ -21,7 +21,7 @@ class Picture(NamedTuple):
     """Picture of a robot's camera.
 
     Attributes:
-        robot: Its index in the scene; `ALIVE` for none.
+        robot: Index of the robot in the scene; `ALIVE` for none.
         number: Number of the frame.
         captured_ms: Capture time, virtual [ms].
         arrived_ms: Arrival time over the link, virtual [ms].
@@ -44,42 +44,42 @@ def pack(picture: Picture) -> bytes:
 
 
 class Unpacker:
-    """Records out of pieces of bytes.
+    """Assembles records from pieces of bytes.
 
     Attributes:
-        skipped: Bytes that belonged to no whole record.
+        skipped: Number of bytes outside of complete records.
     """
 
     def __init__(self) -> None:
-        self._rest = bytearray()
+        self._unread = bytearray()
         self.skipped = 0
 
     def feed(self, data: bytes) -> list[Picture]:
-        """Take some bytes; the pictures that are complete with them."""
-        self._rest += data
+        """Take some bytes and return the pictures that they complete."""
+        self._unread += data
         pictures = []
-        while len(self._rest) >= 4 + len(MAGIC):
+        while len(self._unread) >= 4 + len(MAGIC):
             first = self._first()
             if first is None:
                 break
             picture, used = first
-            del self._rest[:used]
+            del self._unread[:used]
             if picture is not None:
                 pictures.append(picture)
         return pictures
 
     def _first(self) -> tuple[Picture | None, int] | None:
-        """Return the first record and its bytes.
+        """Return the first picture and the size of its record [B]; None if more bytes are needed.
 
-        No picture if bytes are to be skipped; None to wait.
+        Where a record is damaged, the picture is None and the size is that of the bytes to skip.
         """
-        size = int.from_bytes(self._rest[:4], "big")
-        if size > MAX_HEADER or self._rest[4 : 4 + len(MAGIC)] != MAGIC:
+        size = int.from_bytes(self._unread[:4], "big")
+        if size > MAX_HEADER or self._unread[4 : 4 + len(MAGIC)] != MAGIC:
             return None, self._skip()
-        if len(self._rest) < 4 + size:
+        if len(self._unread) < 4 + size:
             return None
         try:
-            header = json.loads(self._rest[4 : 4 + size])
+            header = json.loads(self._unread[4 : 4 + size])
             names = ("robot", "n", "captured_ms", "arrived_ms", "bytes")
             robot, number, captured, arrived, length = (int(header[name]) for name in names)
         except (ValueError, KeyError, TypeError):
@@ -87,18 +87,18 @@ class Unpacker:
         end = 4 + size + length
         if not 0 <= length <= MAX_PICTURE:
             return None, self._skip()
-        if self._rest.find(MAGIC, 4 + size, end) >= 0:
+        if self._unread.find(MAGIC, 4 + size, end) >= 0:
             return None, self._skip()
-        if len(self._rest) < end:
+        if len(self._unread) < end:
             return None
-        jpeg = bytes(self._rest[4 + size : end])
+        jpeg = bytes(self._unread[4 + size : end])
         if jpeg and not jpeg.endswith(JPEG_END):
             return None, self._skip()
         return Picture(robot, number, captured, arrived, jpeg), end
 
     def _skip(self) -> int:
-        """Return how many bytes to skip to where a record may begin."""
-        following = self._rest.find(MAGIC, 5)
-        used = following - 4 if following > 0 else max(1, len(self._rest) - len(MAGIC) - 3)
+        """Return the number of bytes before the next possible record."""
+        following = self._unread.find(MAGIC, 5)
+        used = following - 4 if following > 0 else max(1, len(self._unread) - len(MAGIC) - 3)
         self.skipped += used
         return used

@@ -17,7 +17,7 @@ class DrawnSceneLine(TypedDict):
 
 
 class ContainedLine(TypedDict):
-    """A hazard is contained, at a time."""
+    """The containment of a hazard, with its time."""
 
     k: Literal["contain"]
     t: int
@@ -27,7 +27,7 @@ class ContainedLine(TypedDict):
 class FrameLine(TypedDict):
     """The state of the world when a frame that has arrived was taken.
 
-    `figures`: of each the kind, number, place [m], heading [rad] and what it does.
+    `figures`: kind, number, position [m], heading [rad] and activity of each.
     """
 
     k: Literal["frame"]
@@ -51,7 +51,7 @@ class PictureLine(TypedDict):
 
 
 class ReadyLine(TypedDict):
-    """All pictures are real: nothing has to be built before the first one."""
+    """Note that all pictures come from real cameras, so that no scene has to be built."""
 
     k: Literal["ready"]
     t: int
@@ -64,11 +64,11 @@ class Show(Protocol):
     """Takes lines for the drawing process, with a key where only the newest line counts."""
 
     def __call__(self, line: PaintersLine, key: object = "", /) -> object:
-        """Take one."""
+        """Take a line."""
 
 
 def contained_line(number: int, when: float) -> ContainedLine:
-    """Contain a hazard at a time [s]."""
+    """Return the line for the containment of a hazard at a time [s]."""
     return {"k": "contain", "t": round(1000 * when), "n": number}
 
 

@@ -1,8 +1,8 @@
 """Draws the camera pictures that are watched, in a process or a thread of its own.
 
-It hears from the run which frames arrived, and from the server of the pictures which robots are
-watched; of each watched robot it draws the newest frame, in turn. Nobody waits for it, and it waits
-for nobody: a frame or a picture for which there is no time is dropped and counted.
+The run sends the frames that arrived, the picture server the robots that are watched; the newest
+frame of each watched robot is drawn in turn. No process waits for another: frames and pictures for
+which there is no time are dropped and counted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NICENESS = 3  # lower priority: the run goes first
 ALIVE_S = 1.0  # heartbeat period [s]
 IDLE_S = 0.25  # polling period [s]
 RATE_ROOM = 1.25  # maximum rate of pictures relative to the frames of a run in real time
-MIN_RATE = 12.0  # rate of pictures of a robot that is drawn in any case [1/s]
+MIN_RATE = 12.0  # rate of pictures of a robot that is always allowed [1/s]
 
 Line = dict[str, Any]
 
@@ -30,8 +30,8 @@ class Painter:
 
     Attributes:
         drawn: Pictures that were drawn.
-        dropped: Frames that were replaced by newer ones before they were drawn, and pictures that
-            nobody took.
+        dropped: Number of frames replaced by newer ones before they were drawn, and of pictures
+            that the server did not take.
     """
 
     def __init__(self) -> None:
@@ -44,11 +44,11 @@ class Painter:
 
     @property
     def is_ready(self) -> bool:
-        """True once the site is built, which takes seconds, or where nothing has to be drawn."""
+        """True once the site is built, which takes seconds, or where nothing is drawn."""
         return self._eyes is not None or self._only_passes
 
     def hear(self, line: Line) -> None:
-        """Take a line from either end."""
+        """Handle a line from the run or the picture server."""
         kind = line.get("k")
         if "watch" in line:
             self._watch(frozenset(line["watch"]))
@@ -88,7 +88,7 @@ class Painter:
         return Picture(robot, frame["number"], captured, arrived, jpeg)
 
     def _jpeg(self, frame: Line) -> bytes:
-        """Return the picture of a frame: as a real camera has taken it, or drawn."""
+        """Return the JPEG of a frame, drawn or taken by a real camera."""
         if "jpeg" in frame:
             return base64.b64decode(frame["jpeg"])
         assert self._eyes is not None
@@ -96,7 +96,7 @@ class Painter:
 
 
 def run(world: PipeEnd, web: PipeEnd) -> Painter:
-    """Draw until either process has ended."""
+    """Draw until either pipe closes."""
     painter = Painter()
     alive = 0.0
     while world.is_open and web.is_open:

@@ -1,7 +1,7 @@
-"""Watched frames: noted when they are taken, passed on when they have arrived.
+"""Frames of watched robots, noted when they are taken and passed on when they have arrived.
 
-They come over the modelled link, to the seat that holds the robot, or else to a screen of the
-console. The data of a frame are those of the time when it was taken.
+They arrive over the modelled link, at the seat that holds the robot or at a screen of the console.
+The figures of a frame are those at its capture time.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class FilmedRun(Protocol):
 
     @property
     def clock(self) -> Clock:
-        """Its time."""
+        """Return the clock of the run."""
 
     @property
     def network(self) -> Transport:
@@ -46,12 +46,12 @@ class FilmedRun(Protocol):
 
 
 class Screens:
-    """The cameras of a run, as far as anybody looks at them.
+    """The watched cameras of a run.
 
     Args:
-        screen: Id of a device of its own.
+        screen: Id of the device that receives frames.
         numbers: Numbers of all agents, by id or name.
-        tell: Callback for a line for each frame that has arrived, and the robot's number.
+        tell: Callback for the line of each frame that has arrived, and the robot's number.
     """
 
     def __init__(
@@ -65,12 +65,12 @@ class Screens:
         self._screen = screen
         self._numbers = numbers
         self._tell = tell
-        self._taken: dict[str, OrderedDict[int, tuple[int, list[Any]]]] = {}
+        self._under_way: dict[str, OrderedDict[int, tuple[int, list[Any]]]] = {}
         self._count: dict[str, int] = {}
         self._subscribed: dict[str, Subscription] = {}
         self._watched: set[str] = set()
-        self._held: set[str] = set()
-        self._reach = max(MIN_SEEN, PEOPLE_RANGE_FACTOR * run.scenario.camera.range_m)
+        self._held_robots: set[str] = set()
+        self._range = max(MIN_SEEN, PEOPLE_RANGE_FACTOR * run.scenario.camera.range_m)
         for robot in run.field.robots.values():
             robot.filmed = self._film
 
@@ -85,24 +85,24 @@ class Screens:
         return sorted(self._watched)
 
     def hold(self, robots: set[str]) -> None:
-        """Hold robots whose frames a seat receives anyway."""
-        self._held = robots
+        """Set the robots whose frames a seat receives anyway, by id."""
+        self._held_robots = robots
         self._subscribe()
 
-    def arrived(self, robot: str, came: CameraFrame | bytes) -> None:
-        """Take a frame that has come over the link."""
-        taken = self._taken.get(robot)
-        frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
-        if robot not in self._watched or taken is None or frame is None:
+    def arrived(self, robot: str, data: CameraFrame | bytes) -> None:
+        """Handle a frame that has arrived over the link."""
+        under_way = self._under_way.get(robot)
+        frame = data if isinstance(data, CameraFrame) else CameraFrame.unpack(data)
+        if robot not in self._watched or under_way is None or frame is None:
             return
         tick = frame.observation.tick
         now = self._run.clock.now
-        entry = taken.get(tick)
+        entry = under_way.get(tick)
         if entry is None:
             return
         number, figures = entry
-        while next(iter(taken)) != tick:
-            taken.popitem(last=False)
+        while next(iter(under_way)) != tick:  # drop older frames
+            under_way.popitem(last=False)
         observation = frame.observation
         line: FrameLine = {
             "k": "frame",
@@ -120,7 +120,7 @@ class Screens:
         self._tell(line, self._numbers[robot])
 
     def _subscribe(self) -> None:
-        robots = self._watched - self._held
+        robots = self._watched - self._held_robots
         for robot in self._subscribed.keys() - robots:
             self._subscribed.pop(robot).close()
         for robot in sorted(robots - self._subscribed.keys()):
@@ -128,33 +128,33 @@ class Screens:
             self._subscribed[robot] = self._run.network.subscribe(
                 self._screen, robot, FRAME, arrived
             )
-        for robot in self._taken.keys() - self._watched:
-            del self._taken[robot]
+        for robot in self._under_way.keys() - self._watched:
+            del self._under_way[robot]
 
     def _film(self, robot: str, frame: CameraFrame) -> None:
-        """Note the frame of a robot, and who was near if anybody will see it."""
+        """Count a frame; note the figures nearby if its robot is watched."""
         self._count[robot] = number = self._count.get(robot, 0) + 1
         if robot not in self._watched:
             return
-        taken = self._taken.setdefault(robot, OrderedDict())
-        taken[frame.observation.tick] = number, self._figures(robot, frame)
-        if len(taken) > MAX_UNDER_WAY:
-            taken.popitem(last=False)
+        under_way = self._under_way.setdefault(robot, OrderedDict())
+        under_way[frame.observation.tick] = number, self._figures(robot, frame)
+        if len(under_way) > MAX_UNDER_WAY:
+            under_way.popitem(last=False)
 
     def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:
-        """Return the figures that may be in the picture: kind, number, place, heading, activity."""
+        """Return the figures that may be visible: kind, number, position, heading, activity."""
         field = self._run.field
         observation = frame.observation
-        here = (observation.x, observation.y)
+        position = (observation.x, observation.y)
         figures = list[Any]()
         for id_tag, other in field.robots.items():
             pose = other.body.pose()
-            if id_tag != robot and math.dist(here, (pose.x, pose.y)) < self._reach:
+            if id_tag != robot and math.dist(position, (pose.x, pose.y)) < self._range:
                 mode = other.controller.mode.value
                 figures.append(self._figure("robot", id_tag, pose.x, pose.y, pose.heading, mode))
         for name, agent in field.people():
             x, y = agent.walking.place
-            if agent.activity != SAFE and math.dist(here, (x, y)) < self._reach:
+            if agent.activity != SAFE and math.dist(position, (x, y)) < self._range:
                 kind = "guard" if hasattr(agent, "device") else "bystander"
                 figures.append(self._figure(kind, name, x, y, agent.heading, agent.activity))
         return figures
@@ -167,10 +167,10 @@ class Screens:
 
 
 class OwnScreens(Screens):
-    """Cameras as seen at the robots themselves: without a network between."""
+    """Cameras observed at the robots themselves, without a network."""
 
     def _subscribe(self) -> None:
-        """Subscribe to nothing: nobody has to be asked for the pictures."""
+        """Subscribe to nothing: `look` takes the pictures directly."""
 
     def look(self) -> None:
         """Take a picture with each camera that is watched and works."""
@@ -189,5 +189,5 @@ def camera_url(base: str, label: str) -> str:
 
 
 def topic_of(url: str) -> str | None:
-    """Return the frames of a console's cameras, whose URL is one for browsers."""
+    """Return the frames' topic for a URL that is for browsers, as a console's are; else None."""
     return FRAME if url.startswith("http") else None

@@ -1,8 +1,7 @@
 """The cameras of a run in real time, as streams that begin with the first viewer.
 
-The run's process holds the listening socket. What draws and serves is started with the first
-viewer, in a process of its own, so that nobody pays for pictures that nobody sees, and no picture
-delays the run.
+The run's process holds the listening socket. A child process that draws and serves starts with the
+first viewer, so that pictures cost nothing without viewers and never delay the run.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ class CameraService:
         host: Address to listen on.
         port: Port; if it is taken, or 0, any free one.
         clock: Clock of the run.
-        tell: Callback for a line for the story of the run.
+        tell: Callback that adds a line to the story of the run.
 
     Attributes:
         base: URL below which the cameras are.
@@ -70,7 +69,7 @@ class CameraService:
         self._seed = seed
         self._labels = [robot.device.label for robot in run.field.robots.values()]
         for id_tag in run.field.robots:
-            self._numbers[id_tag]  # robots come first, in the order of their labels
+            self._numbers[id_tag]  # assigns a number: robots first, in the order of their labels
         self._screens = OwnScreens(run, "", self._numbers, self._show)
         self._clock.every(1.0 / run.scenario.camera.rate_hz, self._look)
         self._await_viewers()
@@ -80,7 +79,7 @@ class CameraService:
         self._tell(f"shows pictures of the robots at {camera_url(self.base, 'LABEL')}")
 
     def _begin(self) -> None:
-        """Start the process that draws and serves; it accepts the first viewer."""
+        """Start the child process, which accepts the first viewer."""
         self._clock.unwatch(self._listener.fileno())
         words = ["--listen-fd", str(self._listener.fileno()), "--host", self._host]
         words += ["--labels", json.dumps(self._labels)]
@@ -99,7 +98,7 @@ class CameraService:
         self._contained.clear()
 
     def _watch(self, numbers: list[int]) -> None:
-        """Film the robots that are watched, by their numbers."""
+        """Set the watched robots, by number."""
         assert self._run is not None
         ids = list(self._run.field.robots)
         self._screens.watch({ids[n] for n in numbers if 0 <= n < len(ids)})
@@ -109,7 +108,7 @@ class CameraService:
         return child is self._child
 
     def _hear(self) -> None:
-        """Note the watched robots; after the end of the process, wait for another viewer."""
+        """Handle the child's lines; after its end, wait for another viewer."""
         assert self._child is not None
         pipe = self._child.pipe
         for line in pipe.lines():

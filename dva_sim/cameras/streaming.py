@@ -1,4 +1,4 @@
-"""A response that ends when its viewer leaves, or is too slow for the pictures."""
+"""A response that ends when its viewer leaves or is too slow."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from starlette.types import Receive, Scope, Send
 from dva_sim.cameras.streams import BOUNDARY
 from dva_sim.serving.connection import wire_of
 
-STALLED = 5.0  # a viewer that has not taken a picture within this is cut [s]
+STALLED = 5.0  # time within which a viewer must take a picture [s]
 
 
 class PictureStream(Response):
     """Pictures of a robot, one after the other.
 
     Args:
-        parts: Its pictures, as parts of a response.
+        parts: Pictures, as parts of a multipart response.
         leave: Callback once the viewer is gone.
     """
 

@@ -1,7 +1,7 @@
-"""Pictures of robots' cameras as streams that any browser or player shows.
+"""Streams of robots' pictures that any browser or player can show.
 
 Each picture is drawn once for all viewers, and none without a viewer. A slow viewer gets
-the newest picture when it is ready for one, and never those between.
+the newest picture whenever it is ready for one, and misses those between.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dva_sim.cameras.frames import ALIVE, Picture, Unpacker
 BOUNDARY = "dva-sim-frame"
 LINGERS = 1.0  # time for which a robot is still drawn after its last viewer left [s]
 SILENCE = 3.0  # silence of the drawing process after which there is no picture [s]
-STARTING = 60.0  # time until its first message, which comes when the site is built [s]
+STARTING = 60.0  # maximum wait for the drawing process to build the site [s]
 ONE_WITHIN = 8.0  # maximum wait for a single picture [s]; links may be slow
 FRESH_FOR_S = 1.0  # a picture younger than this is returned without waiting [s]
 MAX_VIEWERS = 64
@@ -39,11 +39,11 @@ class Viewer:
 
 
 class CameraStreams:
-    """The newest picture of each robot that is looked at.
+    """The newest picture of each watched robot.
 
     Args:
         watch: Called with the numbers of the robots that are watched, and True if they changed.
-        watched_elsewhere: Returns the robots that are watched elsewhere.
+        watched_elsewhere: Function that returns the robots watched by other means.
 
     Attributes:
         skipped: Pictures that viewers were too slow for.
@@ -58,8 +58,8 @@ class CameraStreams:
         self._watched_elsewhere = watched_elsewhere
         self._unpacker = Unpacker()
         self._newest: dict[int, tuple[Picture, float]] = {}
-        self._drawn = asyncio.Condition()
-        self._viewers: dict[Viewer, None] = {}  # in the order in which they came
+        self._has_changed = asyncio.Condition()
+        self._viewers: dict[Viewer, None] = {}  # in the order of admission
         self._lingering: Counter[int] = Counter()
         self._last_sent: frozenset[int] = frozenset()
         self._deadline = 0.0
@@ -68,7 +68,7 @@ class CameraStreams:
         self.skipped = 0
 
     def begin(self) -> None:
-        """Expect a painter, which will report in a while."""
+        """Wait for a painter, which reports once it has built the site."""
         self._deadline = time.monotonic() + STARTING
 
     @property
@@ -76,7 +76,7 @@ class CameraStreams:
         """True while a painter reports."""
         return not self._is_over and time.monotonic() < self._deadline
 
-    # --- pictures in ---------------------------------------------------------------------
+    # --- incoming pictures ---------------------------------------------------------------
 
     def take(self, data: bytes) -> None:
         """Take bytes that the painter has written."""
@@ -93,10 +93,10 @@ class CameraStreams:
         task.add_done_callback(self._notified.discard)
 
     async def _notify(self) -> None:
-        async with self._drawn:
-            self._drawn.notify_all()
+        async with self._has_changed:
+            self._has_changed.notify_all()
 
-    # --- who looks -----------------------------------------------------------------------
+    # --- viewers -------------------------------------------------------------------------
 
     def tell(self, again: bool = False) -> None:
         """Report the robots that are watched, if they have changed."""
@@ -110,9 +110,9 @@ class CameraStreams:
             self._watch(sorted(robots), new)
 
     def admit(self, robot: int, rank: int) -> Viewer | None:
-        """Return a new viewer; None if there are too many, and none of a lower rank.
+        """Return a new viewer; None if there are too many of the same or a higher rank.
 
-        One of a lower rank has to leave for one of a higher rank.
+        If there are too many, one of a lower rank has to leave.
         """
         if len(self._viewers) >= MAX_VIEWERS:
             least = min(self._viewers, key=lambda viewer: viewer.rank)
@@ -140,7 +140,7 @@ class CameraStreams:
             self._newest.pop(robot, None)
         self.tell()
 
-    # --- pictures out --------------------------------------------------------------------
+    # --- outgoing pictures ---------------------------------------------------------------
 
     async def stream(self, viewer: Viewer) -> AsyncGenerator[bytes, None]:
         """Yield pictures as parts of a response, each newer than the one before."""
@@ -156,7 +156,7 @@ class CameraStreams:
             self.leave(viewer)
 
     async def one(self, viewer: Viewer) -> Picture | None:
-        """Return the newest picture; None if there is none for too long."""
+        """Return the newest picture; None if none arrives within `ONE_WITHIN`."""
         try:
             newest = self._newest.get(viewer.robot)
             if newest is not None and time.monotonic() - newest[1] < FRESH_FOR_S:
@@ -169,7 +169,7 @@ class CameraStreams:
             self.leave(viewer)
 
     async def _after(self, viewer: Viewer, shown: Picture | None) -> Picture | None:
-        """Return the newest picture once it is another one; None if there will be no more."""
+        """Wait for a picture other than `shown`; return None if there will be no more."""
         robot = viewer.robot
 
         def is_new() -> bool:
@@ -178,20 +178,20 @@ class CameraStreams:
         def is_over() -> bool:
             return self._is_over or viewer.is_over
 
-        async with self._drawn:
-            await self._drawn.wait_for(lambda: is_over() or is_new())
+        async with self._has_changed:
+            await self._has_changed.wait_for(lambda: is_over() or is_new())
         return None if is_over() else self._newest[robot][0]
 
     def close(self) -> None:
-        """Take no more pictures, and end all streams."""
+        """End all streams, and take no more pictures."""
         self._is_over = True
         self._wake()
 
 
 def part(picture: Picture) -> bytes:
-    """Return a picture as a part of a multipart response, with the boundary behind it.
+    """Return a picture as a part of a multipart response, followed by the boundary.
 
-    A viewer shows a picture when it knows that it is whole: the next boundary says so at once.
+    A player shows a picture once it is complete, which the next boundary tells at once.
     """
     head = "".join(f"{name}: {value}\r\n" for name, value in headers_of(picture).items())
     head += f"Content-Type: image/jpeg\r\nContent-Length: {len(picture.jpeg)}\r\n\r\n"
