@@ -1,6 +1,6 @@
-"""Gymnasium environments: who goes where, and driving a robot whose pictures come late.
+"""Gymnasium environments: sending responders, and driving a robot by delayed pictures.
 
-Importing this makes them known to Gymnasium, which is the extra `rl` (`pip install -e '.[rl]'`):
+Importing this package registers them with Gymnasium (extra `rl`: `pip install -e '.[rl]'`):
 
 ```
 import dva_sim.envs
@@ -26,7 +26,7 @@ for _name, _entry_point in (
     ("dva_sim/Dispatch-v0", "dva_sim.envs.dispatch:DispatchEnv"),
     ("dva_sim/Drive-v0", "dva_sim.envs.drive:DriveEnv"),
 ):
-    if _name not in gymnasium.registry:  # it may be imported again
+    if _name not in gymnasium.registry:  # a reload imports this twice
         gymnasium.register(id=_name, entry_point=_entry_point)
 
 __all__ = ["DispatchEnv", "DriveEnv", "play"]

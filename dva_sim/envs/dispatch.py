@@ -1,7 +1,7 @@
-"""`dva_sim/Dispatch-v0`: decide who goes where, one order at a time.
+"""`dva_sim/Dispatch-v0`: send responders to events, one order at a time.
 
-A shift of the timed model goes on until the DVA has something to decide. Each action adds one piece
-of advice to that decision, or ends it; then time passes until the next one.
+A shift of the timed model runs until the DVA has to decide. Each action adds one piece of advice to
+that decision or ends it; then time passes until the next one.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ TASK_COLUMNS: Final = (
     "due",
     "severity",
     "confidence",
-    "age_s",  # since it was first reported
+    "age_s",  # time since the first report
     "waiting_s",
-    "engaged",  # 1 if somebody is under way to it
+    "engaged",  # 1 if a responder is on its way
 )
 UNIT_COLUMNS: Final = ("free", "robot", "engaged")  # may be sent; is a robot; is under way
 MINUTE: Final = 60.0
@@ -53,37 +53,38 @@ BOUND: Final = 1e7  # bound of all observations
 
 
 class DispatchEnv(gymnasium.Env[Observations, int]):
-    """Decisions about who goes where, one order at a time.
+    """Dispatch decisions of a shift, one order at a time.
 
-    Decisions in which nothing can be done but wait end by themselves. Actions are numbers: 0 ends
-    the decision, `1 + task * units + unit` sends a unit to a task, and where they are asked for,
-    numbers after those announce tasks and let guards wait at stations. `info["action_mask"]`, also
-    an observation, and `action_masks()` say which are allowed; one that is not ends the decision,
-    and `info["refused"]` is true. What is no action raises `ValueError`.
+    Decisions without a choice other than waiting are skipped. Actions are numbers: 0 ends the
+    decision and `1 + task * units + unit` sends a unit to a task; higher numbers announce tasks
+    (with `auctions`) and send guards to wait at stations (with `relocates`).
+    `info["action_mask"]`, also an observation, and `action_masks()` tell which are allowed; an
+    action that is not allowed ends the decision, and `info["refused"]` is true. A value that is not
+    an action raises `ValueError`.
 
-    Observations (float32 but for the mask; rows of what is not there are 0):
+    Observations (float32 except the mask; unused rows are 0):
         tasks: `(tasks, columns)` as in `TASK_COLUMNS`, longest reported first.
         units: `(units, columns)` as in `UNIT_COLUMNS`, guards and robots as the scenario has them.
         eta_s: `(tasks, units)`, expected time to arrival [s]; -1 for units that cannot go.
         distance_m: Path length [m], in the same form.
-        bids_s: With `auctions`: what each unit has offered [s]; -1 without a bid.
-        cover_s: With `relocates`: `(units, stations)`, way to each station [s]; -1 if it cannot.
+        bids_s: With `auctions`: bid of each unit [s]; -1 without a bid.
+        cover_s: With `relocates`: `(units, stations)`, time to each station [s]; -1 if unreachable.
         bound_for: With `relocates`: `(units, stations)`, 1 for the station a guard is bound for.
-        operators: `(1,)`, how many robots can still be sent.
-        time_s: `(1,)`, since the shift began.
+        operators: `(1,)`, number of robots that can still be sent.
+        time_s: `(1,)`, time since the shift began.
         action_mask: int8, 1 for each action that is allowed.
 
     The reward of a step is minus the minutes that events have waited during it, from the report
-    until somebody arrived or they were closed: the return of an episode is the sum of all response
-    times. At the end `info["measures"]` has the measures that a study would have of this shift.
+    until a responder arrived or the event was closed: the return of an episode is minus the sum of
+    all response times. At the end `info["measures"]` has the measures of this shift in a study.
 
     Args:
         scenario: A scenario of the timed model by name or path.
         changes: New values by dotted key, such as `{"intensity": 6.9}`.
-        tasks: The most tasks that are seen at a time; newer ones wait until there is room.
-        preempts: Units under way may be sent elsewhere.
-        auctions: Tasks may be announced, and bids are seen.
-        relocates: Guards may be sent to wait at stations.
+        tasks: Maximum number of tasks observed at a time; newer ones wait until there is room.
+        preempts: True if units on their way may be sent elsewhere.
+        auctions: True if tasks may be announced and bids are observed.
+        relocates: True if guards may be sent to wait at stations.
 
     Raises:
         ConfigError: there is no such scenario, it is of another model, or not valid.
@@ -120,12 +121,12 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     @property
     def situation(self) -> Situation | None:
-        """The situation that the DVA asks about, as policies see it; None between shifts."""
+        """Situation that the DVA has to decide on, as policies see it; None between shifts."""
         return None if self._shift is None else self._shift.situation
 
     @property
     def policy_rng(self) -> np.random.Generator:
-        """The random numbers of the shift for policies that use them."""
+        """Random numbers of the shift, for policies that use them."""
         return self._running().rng
 
     # --- the interface of Gymnasium ------------------------------------------------------
@@ -134,16 +135,16 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
-        """Begin a shift: with a seed, the one that `dva-sim run` has with that seed."""
+        """Begin a shift; with a seed, it is the shift of `dva-sim run` with that seed."""
         super().reset(seed=seed)
         self.close()
-        drawn = int(self.np_random.integers(2**31)) if seed is None else seed
-        self._shift = SteppedShift(self.scenario, drawn, **self._flags)
+        shift_seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        self._shift = SteppedShift(self.scenario, shift_seed, **self._flags)
         self._waiting = []
         self._since = 0.0
         self._begin_decision()
         self._reward()
-        return self._seen()
+        return self._observe()
 
     @override
     def step(self, action: int) -> tuple[Observations, float, bool, bool, Info]:
@@ -155,7 +156,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if piece is None or not self._mask[1:].any():
             shift.advise(self._pieces)
             self._begin_decision()
-        observations, info = self._seen()
+        observations, info = self._observe()
         info["refused"] = piece is None and number != DONE
         over = shift.situation is None
         if over and shift.recording is not None:
@@ -170,25 +171,25 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             self._shift = None
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are allowed now, as sb3-contrib asks for it, shape `(n,)`."""
+        """Return which actions are allowed, shape `(n,)`; sb3-contrib calls this method."""
         self._running()
         return self._mask.astype(np.bool_)
 
     # --- actions -------------------------------------------------------------------------
 
     def actions_of(self, advice: Sequence[Advice]) -> list[int]:
-        """Return the actions that give a piece of advice after the other, and end the decision.
+        """Return the actions that give each piece of advice, followed by the end of the decision.
 
         Raises:
-            ValueError: a piece cannot be said here, such as a task beyond the last one seen.
+            ValueError: a piece has no action, such as a task beyond the observed ones.
         """
         return [*map(self._action, advice), DONE]
 
     def _number(self, action: object) -> int:
-        """Read an action: a whole number, plain or of numpy.
+        """Parse an action, an integer of Python or NumPy.
 
         Raises:
-            ValueError: it is none of this environment.
+            ValueError: it is not an action of this environment.
         """
         number = np.asarray(action)
         count = len(self._mask)
@@ -204,7 +205,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             if not self._auctions:
                 raise ValueError("tasks cannot be announced without auctions=True")
             return self._announcements + piece.task
-        unit = self._places[piece.responder]
+        unit = self._unit_numbers[piece.responder]
         if isinstance(piece, Relocation):
             if not self._stations:
                 raise ValueError("guards cannot be sent to stations without relocates=True")
@@ -217,14 +218,14 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             return None
         if action < self._announcements:
             task, unit = divmod(action - 1, self._units)
-            return Assignment(task, self._places.index(unit))
+            return Assignment(task, self._unit_numbers.index(unit))
         if action < self._moves:
             return Announcement(action - self._announcements)
         unit, station = divmod(action - self._moves, self._stations)
-        return Relocation(self._places.index(unit), station)
+        return Relocation(self._unit_numbers.index(unit), station)
 
     def _take(self, piece: Advice) -> None:
-        """Add a piece to the decision: nobody is sent twice, nothing is given twice."""
+        """Add a piece of advice; mask the actions that would use its unit or task again."""
         self._pieces.append(piece)
         situation = self.situation
         assert situation is not None
@@ -232,22 +233,23 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             self._mask[self._announcements + piece.task] = 0
             return
         responder = situation.responders[piece.responder]
-        unit = self._places[piece.responder]
-        self._bar(unit)
+        unit = self._unit_numbers[piece.responder]
+        self._mask_unit(unit)
         if isinstance(piece, Assignment):
-            self._mask[1 + piece.task * self._units :][: self._units] = 0
+            self._mask[1 + piece.task * self._units :][: self._units] = 0  # the row of the task
             if responder.kind == "robot" and responder.engaged is None:
                 self._operators -= 1
                 if self._operators <= 0:
-                    self._bar_idle_robots(situation)
+                    self._mask_idle_robots(situation)
 
-    def _bar(self, unit: int) -> None:
+    def _mask_unit(self, unit: int) -> None:
+        """Disallow all actions of a unit: a column of the tasks' rows, and its row of stations."""
         self._mask[1 + unit : self._announcements : self._units] = 0
         first = self._moves + unit * self._stations
         self._mask[first : first + self._stations] = 0
 
-    def _bar_idle_robots(self, situation: Situation) -> None:
-        for index, responder in zip(self._places, situation.responders, strict=True):
+    def _mask_idle_robots(self, situation: Situation) -> None:
+        for index, responder in zip(self._unit_numbers, situation.responders, strict=True):
             if responder.kind == "robot" and responder.engaged is None:
                 self._mask[1 + index : self._announcements : self._units] = 0
 
@@ -255,38 +257,39 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     def _begin_decision(self) -> None:
         """Begin the next decision in which there is a choice."""
-        self._look()
+        self._read_situation()
         while self.situation is not None and not self._mask[1:].any():
             self._running().advise([])
-            self._look()
+            self._read_situation()
 
-    def _look(self) -> None:
-        """Find the responders of the situation among the units, and the actions that there are."""
+    def _read_situation(self) -> None:
+        """Map the responders of the situation to units, and mark the allowed actions."""
         self._pieces = []
         situation = self.situation
         self._mask = np.zeros(self._moves + self._units * self._stations, dtype=np.int8)
         self._mask[DONE] = 1
-        self._places: list[int] = []
+        self._unit_numbers: list[int] = []
         self._operators = 0
         if situation is None:
             return
+        # Responders are those that may be sent now; units keep their numbers all shift long.
         numbers = {device: n for n, device in enumerate(self._running().units)}
-        self._places = [numbers[responder.device] for responder in situation.responders]
+        self._unit_numbers = [numbers[responder.device] for responder in situation.responders]
         self._operators = situation.operators
         pairs = self._mask[1 : self._announcements].reshape(self._tasks, self._units)
         for row, task in enumerate(situation.tasks[: self._tasks]):
             if task.engaged is None:
-                pairs[row, self._places] = np.isfinite(situation.eta[row])
+                pairs[row, self._unit_numbers] = np.isfinite(situation.eta[row])
         if self._operators <= 0:
-            self._bar_idle_robots(situation)
+            self._mask_idle_robots(situation)
         if self._auctions:
             for row, task in enumerate(situation.tasks[: self._tasks]):
                 free = task.stage == "confirm" and task.engaged is None and task.auction is None
                 self._mask[self._announcements + row] = free
         if self._stations and situation.cover is not None:
             moves = self._mask[self._moves :].reshape(self._units, self._stations)
-            moves[self._places] = np.isfinite(situation.cover.eta)
-            for index, bound in zip(self._places, situation.cover.bound_for, strict=True):
+            moves[self._unit_numbers] = np.isfinite(situation.cover.eta)
+            for index, bound in zip(self._unit_numbers, situation.cover.bound_for, strict=True):
                 if bound is not None:
                     moves[index, bound] = 0
 
@@ -295,7 +298,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             raise RuntimeError("no shift has begun: call reset first")
         return self._shift
 
-    # --- what is seen, and what it is worth ----------------------------------------------
+    # --- observations and rewards ----------------------------------------------
 
     def _space(self) -> spaces.Dict:
         size = self._moves + self._units * self._stations
@@ -316,7 +319,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         }
         return spaces.Dict({**boxes, "action_mask": spaces.MultiBinary(size)})
 
-    def _seen(self) -> tuple[Observations, Info]:
+    def _observe(self) -> tuple[Observations, Info]:
         situation = self.situation
         observations: Observations = {
             name: np.zeros(box.shape or (), dtype=np.float32)
@@ -326,10 +329,10 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         observations["action_mask"] = self._mask.copy()
         observations["time_s"][0] = self._running().now
         if situation is not None:
-            self._show(observations, situation)
+            self._fill(observations, situation)
         return observations, {"action_mask": observations["action_mask"]}
 
-    def _show(self, observations: Observations, situation: Situation) -> None:
+    def _fill(self, observations: Observations, situation: Situation) -> None:
         now = situation.now
         tasks = situation.tasks[: self._tasks]
         for row, task in enumerate(tasks):
@@ -343,7 +346,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
                 max(0.0, now - task.waiting_since),
                 task.engaged is not None,
             )
-        for index, responder in zip(self._places, situation.responders, strict=True):
+        for index, responder in zip(self._unit_numbers, situation.responders, strict=True):
             observations["units"][index] = (
                 1.0,
                 responder.kind == "robot",
@@ -351,16 +354,16 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             )
         observations["operators"][0] = self._operators
         rows = slice(len(tasks))
-        for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):
+        for name, values in (("eta_s", situation.eta), ("distance_m", situation.distance)):
             observations[name][:] = NO_END
-            observations[name][rows, self._places] = _bounded(ways[rows])
+            observations[name][rows, self._unit_numbers] = _bounded(values[rows])
         if self._auctions:
             observations["bids_s"][:] = NO_END
-            observations["bids_s"][rows, self._places] = _bounded(situation.bids[rows])
+            observations["bids_s"][rows, self._unit_numbers] = _bounded(situation.bids[rows])
         if self._stations and situation.cover is not None:
             observations["cover_s"][:] = NO_END
-            observations["cover_s"][self._places] = _bounded(situation.cover.eta)
-            for index, bound in zip(self._places, situation.cover.bound_for, strict=True):
+            observations["cover_s"][self._unit_numbers] = _bounded(situation.cover.eta)
+            for index, bound in zip(self._unit_numbers, situation.cover.bound_for, strict=True):
                 if bound is not None:
                     observations["bound_for"][index, bound] = 1.0
 
@@ -370,27 +373,28 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         since = self._since
         waited = 0.0
         now = self._since = shift.now
-        going_on = []
+        still_waiting = []
         for event in [*self._waiting, *shift.new_events()]:
             end = min(event.times.get(step, math.inf) for step in ("arrived", "closed"))
             waited += max(0.0, min(end, now) - max(since, event.times["detected"]))
             if end > now:
-                going_on.append(event)
-        self._waiting = going_on
+                still_waiting.append(event)
+        self._waiting = still_waiting
         return -waited / MINUTE
 
 
-def _bounded(ways: NDArray[np.float64]) -> NDArray[np.float32]:
+def _bounded(values: NDArray[np.float64]) -> NDArray[np.float32]:
     """Replace infinity and nan by finite values."""
-    return np.where(np.isfinite(ways), np.minimum(ways, BOUND), NO_END).astype(np.float32)
+    return np.where(np.isfinite(values), np.minimum(values, BOUND), NO_END).astype(np.float32)
 
 
 def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> Info:
     """Let a policy decide a whole shift through an environment.
 
     Args:
-        env: Made as the policy wants it (`preempts`, `auctions`, `relocates`).
-        policy: A shipped one, or your own.
+        env: Environment with the options that the policy needs (`preempts`, `auctions`,
+            `relocates`).
+        policy: A shipped policy, or your own.
 
     Returns:
         The last `info`, with the measures, and `return`, the sum of all rewards.
@@ -406,7 +410,7 @@ def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> In
         actions = inner.actions_of(advice)
         for action in actions:
             if over or inner.situation is not situation:
-                break  # nothing was left to decide
+                break  # the decision has ended early: nothing was left to decide
             _, reward, over, _, info = env.step(action)
             total += float(reward)
     return {**info, "return": total}

@@ -19,7 +19,7 @@ def scenario_of(name: str, changes: Mapping[str, Any] | None, kind: type[S], mod
         name: Name or path.
         changes: New values by dotted key.
         kind: Class of the scenarios of that model.
-        model: Model that is needed, for the error.
+        model: Name of the required model, for the error.
 
     Raises:
         ConfigError: there is no such scenario, it is of another model, or not valid.

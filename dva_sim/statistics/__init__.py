@@ -1,14 +1,14 @@
 """Statistics in which the simulated person is the cluster.
 
-Trials of one person are alike, so they never count as independent: every interval here rests
-on persons, either through their means or by drawing persons with all their trials. Missing
+Trials of one person are alike, so they never count as independent: every interval here is based
+on persons, either through their means or by resampling persons with all their trials. Missing
 runs are nan and are left out; with fewer than two persons an interval is nan, not an error.
-All intervals are Monte Carlo intervals: they hold given the model.
+All intervals are Monte Carlo intervals: they are conditional on the model.
 
-How often 95 % intervals hold, in % of studies with 5 trials of each of 24, 12 and 6 persons; how
-much of the variance lies between persons in brackets. Skewed is log-normal, of skewness 1.75 or
-6.2; heavy tails are Student's with 5 degrees of freedom; incomplete is a fifth of the runs and one
-person in twelve missing at random; a study is drawn 10,000 times (seed 2014) where nothing is said.
+Coverage of 95 % intervals, in % of studies with 5 trials of each of 24, 12 and 6 persons; in
+brackets, the share of the variance that lies between persons. Skewed is log-normal, of skewness
+1.75 or 6.2; heavy tails are Student's with 5 degrees of freedom; incomplete is a fifth of the runs
+and one person in twelve missing at random; studies are 10,000 (seed 2014) unless stated.
 
 ============================================================  ====  ====  ====
 means and paired differences, and levels of a band alone        24    12     6
@@ -45,11 +45,11 @@ median, normal (0.3), 3000, seed 2018                         96.7  97.3  98.0
 The percentile's upper end is infinite in 32 and 82 % of the studies of 24 persons, and in all of
 fewer.
 
-What does not hold: nothing does where slow runs are missing more often (a third of those above the
-middle, a twentieth of those below), for the runs that are left are other runs. Tests to one side
-err more often where the tail is: with the 5 % allowed, in 5 to 8 % of studies of skewness 1.75 and
-in 8 to 15 % of skewness 6.2, and to the other side less. So do tests of equivalence. With 12
-persons or fewer of whom most are zero intervals are too short.
+Limits: no interval is valid where slow runs are missing more often (here a third of those above the
+median, a twentieth of those below), as the remaining runs are not representative. One-sided tests
+at 5 % err too often towards the long tail: in 5 to 8 % of studies of skewness 1.75 and in 8 to 15 %
+of skewness 6.2, and less often to the other side. The same holds for tests of equivalence. With 12
+persons or fewer, most of them zero, intervals are too short.
 """
 
 from dva_sim.statistics.bands import Band, band

@@ -1,9 +1,9 @@
 """Several levels at once: means over persons with a band that holds all of them.
 
-It rests on means in units of their standard error, as found by resampling persons.
+The band is based on the excess of resampled means in standard errors (bootstrap-t).
 
-How far an interval reaches is decided on each side by itself: where a few persons are far off,
-the mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
+The length of an interval is determined for each side separately: with a few persons far off, the
+mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
 
 ===============================================  =========  =========  =========  ========
 95 % interval covers, in % of studies            Student's  symmetric  each side  here
@@ -19,10 +19,10 @@ seven tenths of the runs zero, the rest skewed   86.5       91.2       93.2     
 four fifths of the persons zero                  95.4       99.0       82.8       99.0
 ===============================================  =========  =========  =========  ========
 
-No interval helps where most persons do not differ and a single one differs much: a study that
-happens to be without him cannot know. If the 24 persons of a shipped study are taken for all there
-are, differences of skewness 2 to 4, up to three quarters of them zero, are covered in 78 to 96 %,
-by Student's in 63 to 91 %.
+No interval is reliable where most persons do not differ and a single one differs much: a study that
+happens to lack this person cannot show it. Resampling the 24 persons of a shipped study as the
+population, with differences of skewness 2 to 4 of which up to three quarters are zero, coverage is
+78 to 96 %, and that of Student's interval 63 to 91 %.
 
 References:
     Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 12.5 (bootstrap-t); Hall,
@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 
 from dva_sim.statistics.persons import LEVEL, RESAMPLES, Floats, draws, students_t
 
-MIN_TO_RESAMPLE = 6  # with fewer, 5 % of the draws repeat one person only and have no spread
+MIN_TO_RESAMPLE = 6  # persons; with fewer, 5 % of draws repeat one person and have no spread
 MIN_ERROR = 0.25  # minimum standard error in any draw, relative to the sample's
 _ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
 
@@ -49,43 +49,44 @@ def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
     is_finite = np.isfinite(values)
     filled = np.where(is_finite, values, 0.0)
     count = weights @ is_finite
-    nobody = count < 1
-    few = count < 2
+    is_empty = count < 1
+    is_single = count < 2
     centre = filled.sum(axis=0) / np.maximum(is_finite.sum(axis=0), 1)
-    off = np.where(is_finite, values - centre, 0.0)  # centred first: squares keep their digits
-    mean = np.where(nobody, np.nan, (weights @ off) / np.maximum(count, 1))
-    square = (weights @ off**2) / np.maximum(count, 1)
-    variance = np.where(few, np.nan, (square - mean**2) / np.maximum(count - 1, 1))
-    tiny = (_ROUNDING * (abs(centre) + abs(off).max(axis=0, initial=0.0))) ** 2
+    # Centred first, so that the squares lose no digits to a large mean.
+    deviations = np.where(is_finite, values - centre, 0.0)
+    mean = np.where(is_empty, np.nan, (weights @ deviations) / np.maximum(count, 1))
+    square = (weights @ deviations**2) / np.maximum(count, 1)
+    variance = np.where(is_single, np.nan, (square - mean**2) / np.maximum(count - 1, 1))
+    tiny = (_ROUNDING * (abs(centre) + abs(deviations).max(axis=0, initial=0.0))) ** 2
     error = np.sqrt(np.where(variance <= tiny, 0.0, variance))
     return mean + centre, error, count
 
 
 def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> Floats:
-    """Return excess of each resampled mean in standard errors `(resamples, k)`.
+    """Return the excess of each resampled mean in standard errors `(resamples, k)`.
 
-    A draw that happens to repeat the same few persons has next to no spread of its own; it is
-    given at least a quarter of the sample's. Without that a level at which most persons do not
-    differ at all would make intervals endless. A draw with fewer than two persons of a level says
-    nothing of it and counts as no deviation.
+    A draw that repeats the same few persons has almost no spread; its standard error is set to at
+    least a quarter of the sample's. Otherwise a level at which most persons do not differ would
+    make intervals endless. A draw with fewer than two persons at a level counts as no deviation
+    there.
 
     Args:
         values: One row per person `(n_persons, k)`, nan where missing.
         mean: Mean of each level `(k,)`.
-        error: Its standard error `(k,)`, above zero.
+        error: Standard error of each level `(k,)`, above zero.
         resamples: Number of bootstrap resamples.
     """
     if not len(mean):
         return np.empty((resamples, 0))
-    drawn, drawn_error, _ = moments(values, draws(len(values), resamples))
-    ratio = (drawn - mean) / np.maximum(drawn_error, MIN_ERROR * error)
+    means, errors, _ = moments(values, draws(len(values), resamples))
+    ratio = (means - mean) / np.maximum(errors, MIN_ERROR * error)
     return np.where(np.isnan(ratio), 0.0, ratio)
 
 
 def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
     """Return standard errors from a mean down and up to the ends of its interval, each `(k,)`.
 
-    On either side the farthest of three: Student's, that of the deviations whatever their sign,
+    On either side it is the largest of three quantiles: Student's, that of the absolute deviations,
     and that of the deviations to this side. With fewer than 6 persons it is Student's.
 
     Args:
@@ -110,7 +111,7 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
 def chance_above(means: Floats) -> float:
     """Return the probability that persons' means `(n,)` lie this far above a true mean of zero.
 
-    The one-sided p-value that belongs to `reach`: it is below 0.025 where the interval of 95 %
+    It is the one-sided p-value that corresponds to `reach`: below 0.025 where the 95 % interval
     lies above zero. Nan with fewer than two persons.
     """
     from scipy import special
@@ -118,14 +119,14 @@ def chance_above(means: Floats) -> float:
     mean, error, _ = (x[0] for x in moments(means[:, np.newaxis], np.ones((1, len(means)))))
     if not error[0] > 0:
         return float(mean[0] <= 0) if len(means) > 1 else math.nan
-    off = mean[0] / error[0]
-    students = float(special.stdtr(len(means) - 1, -off))
+    excess = mean[0] / error[0]
+    students = float(special.stdtr(len(means) - 1, -excess))
     if len(means) < MIN_TO_RESAMPLE:
         return students
     ratio = studentised(means[:, np.newaxis], mean, error, RESAMPLES)
-    either = (abs(ratio) >= off).mean() / 2
-    above = (ratio >= off).mean()
-    return max(students, float(either), float(above))
+    symmetric = (abs(ratio) >= excess).mean() / 2
+    above = (ratio >= excess).mean()
+    return max(students, float(symmetric), float(above))
 
 
 def place(n: int, level: float) -> int:
@@ -140,11 +141,11 @@ class Band:
     Attributes:
         mean: Means over persons `(k,)`; nan where nobody has a value.
         low: Lower edge of the simultaneous band `(k,)`; nan with fewer than two persons.
-        high: Its upper edge `(k,)`.
+        high: Upper edge of the simultaneous band `(k,)`.
         pointwise_low: Lower end of each level's own interval `(k,)`.
-        pointwise_high: Its upper end `(k,)`.
+        pointwise_high: Upper end of each level's own interval `(k,)`.
         critical: Standard errors between each mean and the farther edge of the band `(k,)`; nan
-            where there is no spread to measure by.
+            without spread.
         n_persons: Number of persons with at least one value.
     """
 
@@ -160,12 +161,12 @@ class Band:
 def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES) -> Band:
     """Return a band that holds all levels at once with the given confidence.
 
-    It is each level's own interval at a stricter confidence, the same for all levels: the one at
-    which all of them hold at once when persons are resampled. That respects how the levels
-    depend on each other and how skewed each is. A deviation counts by how rare it is at its own
-    level, so that a level at which next to nobody differs, whose deviations are large in standard
-    errors, widens no other. A level with fewer than 6 persons gets Bonferroni's t, and the others
-    share what it leaves of the chance to err.
+    It consists of each level's own interval at a stricter confidence, the same for all levels,
+    chosen so that all of them hold at once when persons are resampled. This accounts for the
+    dependence between levels and for the skewness of each. Deviations are compared by their rarity
+    at their own level: a level at which few persons differ, whose deviations are large in standard
+    errors, does not widen the others. A level with fewer than 6 persons gets Bonferroni's t; the
+    others share the remaining chance of error.
 
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
@@ -179,7 +180,7 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
     values = np.atleast_2d(np.asarray(differences, dtype=float))
     values = values[np.isfinite(values).any(axis=1)]
     mean, error, count = (x[0] for x in moments(values, np.ones((1, len(values)))))
-    judged = error > 0  # neither nan nor without spread
+    judged = error > 0  # neither nan nor zero
     ratio = studentised(values[:, judged], mean[judged], error[judged], resamples)
     alone, together = np.where(count > 1, 0.0, np.full((2, 2, len(mean)), np.nan))
     alone[:, judged] = reach(ratio, count[judged], level)
@@ -209,14 +210,14 @@ def _reach_of_all(ratio: Floats, count: Floats, level: float) -> tuple[Floats, F
 
 
 def _share_of_each(sizes: Floats, level: float) -> float:
-    """Return the chance to err at each level that leaves all of them to hold at once with `level`.
+    """Return the chance of error per level at which all levels hold at once with `level`.
 
     Args:
         sizes: Deviations in bootstrap resamples of persons `(resamples, k)`.
         level: Confidence that all hold.
     """
-    drawn = len(sizes)
+    resamples = len(sizes)
     columns = zip(np.sort(sizes, axis=0).T, sizes.T, strict=True)
-    at_least = [drawn - np.searchsorted(ranked, of_level) for ranked, of_level in columns]
+    at_least = [resamples - np.searchsorted(ranked, of_level) for ranked, of_level in columns]
     rarest = np.sort(np.min(at_least, axis=0))
-    return float(rarest[drawn - 1 - place(drawn, level)]) / drawn
+    return float(rarest[resamples - 1 - place(resamples, level)]) / resamples

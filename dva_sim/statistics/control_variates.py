@@ -1,10 +1,10 @@
 """Differences adjusted for properties of persons and trials that are known before the runs.
 
-It is known how cautious the drawn persons are and how long their ways, and also the average of
-all persons. The excess of the sample over that average, times its effect on the difference (the
-slope), is subtracted (control variates). The slope is estimated from the same persons. So persons
-enter not with their means but with their jackknife pseudo-values, which include the uncertainty
-of the slope: all intervals and bands are made of them as of means.
+Before the runs, the caution of the drawn persons and the lengths of their routes are known, and so
+are the averages over all persons. The excess of the sample over these averages, times its effect on
+the difference (the slope), is subtracted (control variates). As the slope is estimated from the
+same persons, their means are replaced by jackknife pseudo-values, which include the uncertainty of
+the slope. Intervals and bands are computed from them as from means.
 
 References:
     Lavenberg, Moeller & Welch, Oper. Res. 30 (1982) 182-202 (control variates for simulations);
@@ -19,21 +19,21 @@ from numpy.typing import ArrayLike
 from dva_sim.statistics.persons import Floats
 
 MIN_EACH = 6
-"""Persons for each number that is learned; with fewer the slopes cost more than they are worth."""
-_DISTINCT = 1e-9  # relative size below which a covariate's own part counts as zero
+"""Minimum persons per estimated slope; with fewer, it adds more variance than it saves."""
+_DISTINCT = 1e-9  # relative size below which a covariate counts as a combination of others
 
 
 def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
-    """Return the persons' values whose mean is the adjusted one, level by level.
+    """Return values of the persons whose mean is the adjusted mean, level by level.
 
-    A level with too few persons stays as it is, and so does one whose covariates do not vary.
+    A level with too few persons is not adjusted, nor is one whose covariates do not vary.
 
     Args:
         means: Means of the persons `(n, k)`, nan where missing.
-        covariates: Means of the same trials `(p, n, k)`, of which each has a true mean of zero.
+        covariates: Means of each covariate over the same trials `(p, n, k)`; true mean zero.
 
     Returns:
-        Pseudo-values `(n, k)`, nan where the means are.
+        Pseudo-values `(n, k)`, nan where the means are nan.
     """
     values = np.array(means, dtype=float)
     beside = np.asarray(covariates, dtype=float)
@@ -47,17 +47,16 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
 
 
 def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
-    """Return the jackknife the constant of a regression on covariates `(n, p)`.
+    """Return jackknife pseudo-values of the constant in a regression on covariates `(n, p)`.
 
-    Values as given if singular.
-
-    Leaving a person out changes the constant by what its residual weighs in it.
+    If the regression is singular, return the values unchanged. Leaving out a person changes the
+    constant by the person's residual times its weight.
     """
     n = len(values)
     design = np.column_stack([np.ones(n), covariates])
     inverse = np.linalg.pinv(design, rcond=_DISTINCT)
     residual = values - design @ (inverse @ values)
-    leverage = np.einsum("ij,ji->i", design, inverse)  # how much of each fitted value is its own
+    leverage = np.einsum("ij,ji->i", design, inverse)  # weight of each value in its own fit
     if (leverage > 1 - _DISTINCT).any():
         return values
     constant = float((inverse @ values)[0])
@@ -65,7 +64,7 @@ def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
 
 
 def off_zero(covariate: ArrayLike) -> float:
-    """Return how many standard errors the mean of a covariate `(n,)` is off its true zero."""
+    """Return the deviation of a covariate's mean from its true zero in standard errors."""
     values = np.asarray(covariate, dtype=float)
     values = values[np.isfinite(values)]
     if len(values) < 2 or not np.ptp(values) > 0:

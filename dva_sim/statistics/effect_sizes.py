@@ -1,8 +1,7 @@
-"""Effect sizes, and the reduction of variance by pairing.
+"""Effect sizes, the reduction of variance by pairing, and components of variance.
 
-Sizes without a unit; how alike two treatments' random numbers are; how much of the variance lies
-between persons. All but the last rest on statistics of persons' pairs of means, and on how far they
-would scatter with other persons: sums over persons, so that leaving one out is a subtraction.
+Effect sizes and pairing are statistics of sums over the persons' pairs of means, so that a
+jackknife leaves a person out by subtraction.
 """
 
 from __future__ import annotations
@@ -18,21 +17,21 @@ from numpy.typing import ArrayLike
 from dva_sim.statistics.bands import MIN_ERROR, reach
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
 
-RESAMPLES = 1000  # bootstrap samples, each with as many jackknife steps as there are persons
+RESAMPLES = 1000  # bootstrap samples; each takes a jackknife over all persons
 _MAX_CORRELATION = 1 - 1e-12  # largest correlation, finite on Fisher's scale
-_MIN_PERSONS = 3  # minimum persons: two are always perfectly correlated
+_MIN_PERSONS = 3  # minimum number of persons: two are always perfectly correlated
 
 
 @dataclass(frozen=True)
 class EffectSize:
-    """A paired difference, twice without its unit.
+    """A paired difference in two standardised forms.
 
     Attributes:
         paired: Mean difference over the standard deviation of persons' differences
-            (`d_z`, with Hedges' correction): what decides how many persons a study needs.
+            (`d_z`, with Hedges' correction); it determines how many persons a study needs.
         average: Mean difference over the average standard deviation of persons under the two
-            treatments (`d_av`, with Hedges' correction): how large it is beside how much
-            persons differ.
+            treatments (`d_av`, with Hedges' correction): its size relative to the differences
+            between persons.
     """
 
     paired: Interval
@@ -76,7 +75,10 @@ def _beside_persons(pairs: Pairs) -> Floats:
 
 
 def _size(pairs: Pairs, spread: Floats) -> Floats:
-    """Mean differences over a spread that is as if divided by one less; nan without any."""
+    """Return mean differences over a spread, corrected to `n - 1` degrees of freedom.
+
+    Nan without spread.
+    """
     varies = spread > 0
     size = pairs.difference / np.where(varies, spread, 1)
     return np.where(
@@ -101,9 +103,9 @@ class VarianceReduction:
     """Change in the variance of a difference of two means due to pairing.
 
     Attributes:
-        correlation: Pearson's, of the persons' means under the two treatments.
-        ratio: Variance of the paired difference over the sum of the variances, which is what
-            other persons in each treatment would give: 0.5 halves the persons needed.
+        correlation: Pearson's correlation of the persons' means under the two treatments.
+        ratio: Variance of the paired difference over the sum of the variances, which is the
+            variance without pairing: 0.5 halves the number of persons needed.
     """
 
     correlation: Interval
@@ -116,7 +118,7 @@ class VarianceReduction:
 
 
 def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
-    """Return Pearson's correlation of paired runs: the randomness that two treatments share.
+    """Return Pearson's correlation of paired runs, a measure of shared randomness.
 
     Nan with fewer than two pairs, or where one side does not vary.
     """
@@ -135,7 +137,7 @@ def variance_reduction(
 ) -> VarianceReduction:
     """Return the correlation and ratio of variances that pairing achieved, with intervals.
 
-    It takes what `effect_size` takes.
+    The arguments are those of `effect_size`.
 
     References:
         Fisher, Metron 1 (1921) 3-32 (the scale of correlations).
@@ -152,13 +154,13 @@ def variance_reduction(
 
 
 def _on_fishers_scale(statistic: Statistic) -> Statistic:
-    """Return a correlation where it has no bounds and is spread evenly."""
+    """Transform a correlation to Fisher's scale, without bounds and with constant variance."""
 
-    def unbounded(pairs: Pairs) -> Floats:
+    def transformed(pairs: Pairs) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.arctanh(np.clip(statistic(pairs), -_MAX_CORRELATION, _MAX_CORRELATION))
 
-    return unbounded
+    return transformed
 
 
 def _back(interval: Interval) -> Interval:
@@ -172,17 +174,17 @@ def _correlation(pairs: Pairs) -> Floats:
 
 
 def _shared(pairs: Pairs) -> Floats:
-    """Return the share of the sum of variances that goes by pairing."""
+    """Return the variance of the difference over the sum of the variances."""
     return np.asarray(1 - pairs.apart / (pairs.first + pairs.second))
 
 
 @dataclass(frozen=True)
 class Components:
-    """The variance of one value per run, split.
+    """Variance of a value per run, between and within persons.
 
     Attributes:
-        between: Variance of the persons' own means; never below zero.
-        within: Variance of one person's trials around that mean.
+        between: Variance of the persons' expected values; never below zero.
+        within: Variance of a person's trials around that value.
     """
 
     between: float
@@ -198,9 +200,8 @@ class Components:
 def components(values: ArrayLike) -> Components:
     """Split the variance of `(persons, trials)` by the method of moments; nan are left out.
 
-    The mean squares of a one-way analysis of variance are set equal to what they estimate,
-    with unequal numbers of trials allowed for. Nan with fewer than two persons, or where nobody
-    has a second trial.
+    The mean squares of a one-way analysis of variance are equated with their expectations, also
+    for unequal numbers of trials. Nan with fewer than two persons, or if no person has two trials.
 
     References:
         Searle, Casella & McCulloch, Variance Components (1992), chapter 3.
@@ -216,8 +217,8 @@ def components(values: ArrayLike) -> Components:
         return Components(math.nan, math.nan)
     filled = np.where(is_finite, grid, 0.0)
     means = filled.sum(axis=1) / count
-    off = np.where(is_finite, grid - means[:, np.newaxis], 0.0)
-    within = float((off**2).sum() / (runs - persons))
+    deviations = np.where(is_finite, grid - means[:, np.newaxis], 0.0)
+    within = float((deviations**2).sum() / (runs - persons))
     grand = filled.sum() / runs
     square_between = float((count * (means - grand) ** 2).sum() / (persons - 1))
     trials = (runs - float((count**2).sum()) / runs) / (persons - 1)
@@ -225,7 +226,7 @@ def components(values: ArrayLike) -> Components:
 
 
 class Pairs(NamedTuple):
-    """Sums over the pairs of means of some persons, each entry of the same shape.
+    """Statistics of the pairs of means of some persons; all entries have the same shape.
 
     Attributes:
         persons: Number of persons.
@@ -251,9 +252,9 @@ def _studentised(
     """Return the bootstrap-t of smooth statistics, with the jackknife for their standard errors.
 
     Args:
-        statistics: Each on a scale without bounds.
+        statistics: Statistics, each on a scale without bounds.
         first: Persons' means under one treatment `(n,)`, at least 3.
-        second: Under the other.
+        second: Persons' means under the other treatment `(n,)`.
         resamples: Number of bootstrap resamples.
 
     References:
@@ -263,19 +264,19 @@ def _studentised(
     a, b, off = (x - x.mean() for x in (first, second, first - second))
     rows = np.stack([np.ones(len(first)), a, b, a**2, b**2, off**2])
     shift = float((first - second).mean())
-    whole, drawn = (
-        _Drawn(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))
+    sample, drawn = (
+        _Resamples(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))
     )
-    return [_interval(statistic, whole, drawn, n) for statistic in statistics]
+    return [_interval(statistic, sample, drawn, n) for statistic in statistics]
 
 
-class _Drawn:
-    """Draws of persons, each also without each of its persons.
+class _Resamples:
+    """Resamples of persons, with the statistics of each and of each without one person.
 
     Args:
         weights: Number of times each person is drawn `(b, n)`.
         rows: Contribution of each person to the sums `(6, n)`.
-        shift: Mean difference of all.
+        shift: Mean difference over all persons.
     """
 
     def __init__(self, weights: Floats, rows: Floats, shift: float) -> None:
@@ -297,8 +298,8 @@ class _Drawn:
         return statistic(self.whole), error
 
 
-def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Interval:
-    estimate, error = (float(x[0]) for x in whole.of(statistic))
+def _interval(statistic: Statistic, sample: _Resamples, drawn: _Resamples, n: int) -> Interval:
+    estimate, error = (float(x[0]) for x in sample.of(statistic))
     if not error > 0:
         width = 0.0 if error == 0 else np.nan
         return Interval(estimate, estimate - width, estimate + width, n)
@@ -312,7 +313,7 @@ def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Int
 def _pairs(sums: Floats, shift: float) -> Pairs:
     """Return pairs from sums over persons `(6, ...)`."""
     count = sums[0]
-    one, two, *squares = sums[1:] / np.maximum(count, 1)
-    means = one, two, one - two
+    first, second, *squares = sums[1:] / np.maximum(count, 1)
+    means = first, second, first - second
     variances = (np.maximum(s - m**2, 0) for s, m in zip(squares, means, strict=True))
-    return Pairs(count, one - two + shift, *variances)
+    return Pairs(count, first - second + shift, *variances)

@@ -1,12 +1,12 @@
 """Competing risks: cumulative incidence of each cause over time and by a fixed time.
 
-An event that was escalated will not be confirmed any more. Who takes it for one that "was not
-watched long enough" answers another question: how soon it would have been confirmed if nobody
-could escalate. So the outcomes compete here, and only the end of watching cuts an event off.
+An escalated event will never be confirmed. Treating it as censored would answer another question:
+how soon it would have been confirmed if escalation were impossible. So outcomes are competing
+causes here, and only the end of the follow-up censors an event.
 
-One definition serves all: the share of events that had met a cause by a time. Its value at the
-end of the follow-up is a probability, the area above it a restricted mean, and the time at which
-it crosses a level a percentile.
+All measures derive from the cumulative incidence, the share of events that a cause has ended by
+a time: a probability is its value at the end of the follow-up, a restricted mean the area above
+it, and a percentile the time at which it crosses a level.
 
 References:
     O. O. Aalen and S. Johansen, An empirical transition matrix for non-homogeneous Markov chains
@@ -30,16 +30,16 @@ from dva_sim.statistics.proportions import interval_of_share
 
 Ints = NDArray[np.intp]
 
-CUT = 0  # the cause of events that were no longer watched
+CUT = 0  # cause number of censored events, whose follow-up has ended
 
 
 @dataclass(frozen=True)
 class Incidence:
-    """Share of events that had met each cause by each time: steps, constant between them.
+    """Share of events ended by each cause over time: a step function.
 
     Attributes:
         times: Times of changes, ascending, shape `(k,)` [s].
-        shares: Share that had met each cause from then on, shape `(causes, k)`.
+        shares: Share ended by each cause from that time on, shape `(causes, k)`.
         events: Number of events.
     """
 
@@ -48,7 +48,7 @@ class Incidence:
     events: int
 
     def at(self, times: ArrayLike, cause: int = 1) -> Floats:
-        """Return the share that had met a cause (1: the first) by each of some times [s]."""
+        """Return the share of events ended by a cause (1: the first) by each time [s]."""
         index = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
         if not self.events:
             return np.full(index.shape, np.nan)
@@ -56,12 +56,10 @@ class Incidence:
         return share
 
     def restricted_mean(self, limit: float, cause: int = 1) -> float:
-        """Return the mean of the smaller of `limit` [s] and the time to a cause.
+        """Return the mean time to a cause, restricted to `limit` [s].
 
-        Without it, `limit`.
-
-        It is the area above the curve. Where all are watched until the limit it is the plain
-        mean of `min(time, limit)`, in which an event that never meets the cause counts `limit`.
+        It is the area above the curve. If all events are followed to the limit, it equals the
+        mean of `min(time, limit)`, in which an event that the cause never ends counts `limit`.
         """
         if not self.events:
             return float("nan")
@@ -71,49 +69,49 @@ class Incidence:
         return float(limit - (shares * np.diff(edges)).sum())
 
     def quantile(self, q: float, cause: int = 1) -> float:
-        """Return when a share `q` of all events had met a cause [s]; nan if that never happens."""
+        """Return the time at which a cause has ended a share `q` of events [s]; nan if never."""
         reached = np.flatnonzero(self.shares[cause - 1] >= q - 1e-12)
         return float(self.times[reached[0]]) if len(reached) else float("nan")
 
 
 def first_of(causes: Sequence[ArrayLike], watched: ArrayLike) -> tuple[Floats, Ints]:
-    """Return the first cause that each event met, and when.
+    """Return the time and the cause of each event's end.
 
     Args:
-        causes: For each cause the time at which each event met it [s]; nan or infinite: never.
-            Of two at the same time the earlier in the list counts.
-        watched: Until when each event was watched [s].
+        causes: For each cause, its time for each event [s]; nan or infinite: never. Of two causes
+            at the same time, the first in the list counts.
+        watched: End of the follow-up of each event [s].
 
     Returns:
-        Times `(n,)` and causes `(n,)`, from 1; `CUT` where nothing happened while watched.
+        Times `(n,)` and causes `(n,)`, from 1; `CUT` where none occurred during the follow-up.
     """
     until = np.asarray(watched, dtype=float)
     table = np.array([np.broadcast_to(np.asarray(c, dtype=float), until.shape) for c in causes])
     table = np.where(np.isnan(table), np.inf, table)
     first = table.argmin(axis=0)
     time = table.min(axis=0)
-    met = time <= until
-    return np.where(met, time, until), np.where(met, first + 1, CUT).astype(np.intp)
+    has_ended = time <= until
+    return np.where(has_ended, time, until), np.where(has_ended, first + 1, CUT).astype(np.intp)
 
 
 def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
-    """Return the Aalen and Johansen's estimate of the cumulative incidence of each cause.
+    """Return Aalen and Johansen's estimate of the cumulative incidence of each cause.
 
-    At each time, of those that nothing has happened to so far, the share that meets a cause.
-    What happens at the moment at which others are cut off happens before.
+    Each cause adds, at each time, its share of the events that are still at risk. Events that end
+    at the same time as others are censored count as having ended before.
 
     Args:
-        time: Time at which each event met its cause or was cut off, shape `(n,)` [s].
-        cause: Number of the cause, from 1; `CUT` if it was cut off.
+        time: Time at which each event ended or was censored, shape `(n,)` [s].
+        cause: Number of the cause, from 1; `CUT` if censored, shape `(n,)`.
         causes: Number of causes.
     """
     when = np.asarray(time, dtype=float)
     what = np.asarray(cause, dtype=np.intp)
     times, index = np.unique(when[what != CUT], return_inverse=True)
-    met = np.zeros((causes, len(times)))
-    np.add.at(met, (what[what != CUT] - 1, index), 1.0)
+    endings = np.zeros((causes, len(times)))
+    np.add.at(endings, (what[what != CUT] - 1, index), 1.0)
     at_risk = len(when) - np.searchsorted(np.sort(when), times, side="left")
-    step = met / np.maximum(at_risk, 1)
+    step = endings / np.maximum(at_risk, 1)
     left = np.cumprod(1.0 - step.sum(axis=0))  # Kaplan-Meier of all causes together
     before = np.r_[1.0, left[:-1]] if len(times) else left
     return Incidence(times, np.minimum(np.cumsum(before * step, axis=1), 1.0), len(when))
@@ -121,11 +119,11 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
 
 @dataclass(frozen=True)
 class IncidenceAtHorizon:
-    """Share of each cause that came first by a horizon; the shares sum to 1.
+    """Shares of the outcomes by a horizon, which sum to 1.
 
     Attributes:
         causes: Share of each cause, in the order of the causes' names.
-        nothing: Share to which nothing has happened by then.
+        nothing: Share of events without an outcome by then.
     """
 
     causes: dict[str, Interval]
@@ -137,17 +135,17 @@ def cumulative_incidence(
 ) -> IncidenceAtHorizon:
     """Return Aalen and Johansen's cumulative incidence at a horizon, with intervals.
 
-    A cause that comes first keeps others from being seen; the share of each is what is asked,
-    and one minus Kaplan and Meier's estimate, which takes the others for chance, would be
-    too large. If every run is followed to the horizon these are the plain shares.
+    The first cause prevents all others. One minus Kaplan and Meier's estimate would be too large,
+    as it treats the other causes as censoring. If every run is followed to the horizon, the result
+    is the plain share of each cause.
 
-    The intervals are those of shares, on as many runs as give the variance seen when each
-    person in turn is left out.
+    The intervals are those of shares with the effective number of runs that corresponds to the
+    jackknife variance over persons.
 
     Args:
         times: Time of the outcome, or end of the follow-up `(n,)`; nan where missing.
-        causes: Outcome `(n,)`; None or an empty string for none until then.
-        horizon: Later does not count.
+        causes: Outcome `(n,)`; None or an empty string if there was none until then.
+        horizon: Time after which outcomes do not count [s].
         person: Person of each run `(n,)`.
 
     References:
@@ -176,14 +174,14 @@ def cumulative_incidence(
 
 
 def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[float]:
-    """Return the share of each cause by the horizon, and of none: together exactly 1."""
+    """Return the shares of all causes by the horizon and of no cause, with a sum of exactly 1."""
     curve = incidence(times, causes, count)
-    met = [float(curve.at(horizon, cause).round(12)) for cause in range(1, count + 1)]
-    return [*met, round(1.0 - sum(met), 12)]
+    shares = [float(curve.at(horizon, cause).round(12)) for cause in range(1, count + 1)]
+    return [*shares, round(1.0 - sum(shares), 12)]
 
 
 def _interval(share: Floats, persons: int, runs: int) -> Interval:
-    """Return the interval of the share `[0]` by the shares without each person `[1:]`."""
+    """Return the interval of the share `[0]`, from the shares without each person `[1:]`."""
     if persons < 2:
         estimate = float(share[0]) if persons else math.nan
         return Interval(estimate, math.nan, math.nan, persons)

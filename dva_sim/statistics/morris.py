@@ -23,7 +23,7 @@ STEP = GRID / (2.0 * (GRID - 1))  # step of a factor, as a share of its band
 
 
 def trajectories(axes: int, count: int, rng: np.random.Generator) -> Floats:
-    """Walks through the unit cube `(count, axes + 1, axes)` that change one factor at a time."""
+    """Draw walks through the unit cube `(count, axes + 1, axes)`, changing a factor per step."""
     walks = np.empty((count, axes + 1, axes))
     for walk in walks:
         low = rng.integers(0, GRID // 2, axes) / (GRID - 1)
@@ -39,9 +39,9 @@ class ElementaryEffects:
     """Effects of one factor, each over its whole band, at different values of the other factors.
 
     Attributes:
-        mean: Mean effect, with its interval over trajectories: its sign is the direction.
+        mean: Mean effect, with its interval over trajectories; the sign is the direction.
         size: Mean of the absolute effects, which do not cancel if their signs differ.
-        spread: Standard deviation of the effects: interactions, curvature, and remaining chance.
+        spread: Standard deviation of the effects: interactions, curvature and remaining noise.
     """
 
     mean: Interval
@@ -54,7 +54,7 @@ def elementary_effects(walks: Floats, outcome: NDArray[np.float64]) -> list[Elem
 
     Args:
         walks: See `trajectories`.
-        outcome: At each point `(count, axes + 1)`; nan where there is none.
+        outcome: Outcome at each point `(count, axes + 1)`; nan where missing.
     """
     changes = np.diff(walks, axis=1)
     axis_of_step = abs(changes).argmax(axis=2)

@@ -1,8 +1,8 @@
 """Paired differences between two treatments of the same persons, with intervals.
 
-Means over persons with their interval; whether a difference lies beyond a bound or within a margin;
-whether there is any, by a permutation test, which assumes only that labels could be swapped. Of
-several tests of one family the chance of any false alarm is kept.
+Means over persons with their interval; tests of a difference beyond a bound or within a margin; a
+permutation test of any difference, which assumes only exchangeable labels; and Holm's procedure,
+which keeps the chance of any false alarm among several tests of a family.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from dva_sim.statistics.bands import band, chance_above
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means
 
 PERMUTATIONS = 10_000
-_MAX_EXACT = 14  # persons: 2 ** 14 sign flips are about as many as are drawn otherwise
+_MAX_EXACT = 14  # maximum persons for all 2 ** n sign flips; beyond, as many are drawn
 _SAME = 1e-12  # sums this close, relative to their size, differ by rounding only
 
 
 def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) -> Interval:
     """Return the mean over persons, each counting the same.
 
-    It is what a band gives for one level alone.
+    It is the pointwise interval of a band with one level.
 
     Args:
         values: One value per run `(n,)`, nan where missing.
@@ -46,7 +46,7 @@ def paired_difference(
 
     Args:
         a: Values under one treatment `(n,)`.
-        b: The other `(n,)`, row by row the same person and trial.
+        b: Values under the other `(n,)`, for the same person and trial in each row.
         person: Person of each run `(n,)`.
         level: Confidence level.
     """
@@ -58,34 +58,34 @@ def one_sided_test(
 ) -> float:
     """Return the p-value of the mean of `a - b` being above, or below, a bound.
 
-    By the same resampling as the interval of the difference, so that the two agree: p is
-    below 0.025 where the interval of 95 % lies beyond the bound.
+    It uses the same resampling as the interval of the difference, so that the two agree: p is
+    below 0.025 where the 95 % interval lies beyond the bound.
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
         bound: In the measure's unit.
-        side: On which side of it the difference is claimed to lie.
+        side: Side of the bound on which the difference is claimed to lie.
 
     Returns:
-        Nan with fewer than two persons.
+        The p-value; nan with fewer than two persons.
     """
-    off = person_means(_minus(a, b) - bound, person)[1]
-    return chance_above(off if side == "above" else -off)
+    excess = person_means(_minus(a, b) - bound, person)[1]
+    return chance_above(excess if side == "above" else -excess)
 
 
 def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) -> float:
     """Return the p-value of two one-sided tests that the mean of `a - b` lies within a margin.
 
-    Failing to find a difference is no evidence that there is none: here the burden of proof is
-    on sameness. It is below 0.05 where the interval of 90 % lies within the margin.
+    A difference that is not significant is no evidence of equality; here equality has to be shown.
+    The value is below 0.05 where the 90 % interval lies within the margin.
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
-        margin: Largest difference that does not matter, either way; in the measure's unit.
+        margin: Largest irrelevant difference in either direction, in the measure's unit.
 
     Returns:
         The larger of the two; nan with fewer than two persons.
@@ -98,13 +98,13 @@ def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) ->
 
 
 def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
-    """Swap the labels of the treatments, person by person, and see how rare the outcome is.
+    """Test for any difference by swapping the labels of the treatments, person by person.
 
-    If the treatments did the same to a person, his difference could as well have had the other
-    sign. All trials of a person flip together. With up to 14 persons every combination of signs
-    is tried; else a random sample, with the outcome itself counted among it so that p is
-    never zero and never too small. With fewer than 6 persons p cannot be below 0.05.
-    Whether a difference is beyond some bound is for `one_sided_test`.
+    If the treatments have the same effect on a person, the sign of the person's difference is
+    random. All trials of a person flip together. With up to 14 persons every combination of signs
+    is tried; with more, a random sample, which includes the observed outcome so that p is never
+    zero and never too small. With fewer than 6 persons p cannot be below 0.05. For differences
+    beyond a bound use `one_sided_test`.
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
@@ -112,19 +112,19 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
         person: Person of each run `(n,)`.
 
     Returns:
-        Chance of a difference at least as large, either way, if the labels were swapped at random;
-        nan without persons.
+        Probability of a difference at least as large in either direction under random labels; nan
+        without persons.
 
     References:
         Fisher, The Design of Experiments (1935), section 21; Phipson & Smyth, Stat. Appl. Genet.
         Mol. Biol. 9 (2010) 39.
     """
-    off = person_means(_minus(a, b), person)[1]
-    if not len(off):
+    means = person_means(_minus(a, b), person)[1]
+    if not len(means):
         return math.nan
-    is_exact = len(off) <= _MAX_EXACT
-    signs = _all_signs(len(off)) if is_exact else _random_signs(len(off))
-    extreme = abs(signs @ off) >= abs(float(off.sum())) - _SAME * float(abs(off).sum())
+    is_exact = len(means) <= _MAX_EXACT
+    signs = _all_signs(len(means)) if is_exact else _random_signs(len(means))
+    extreme = abs(signs @ means) >= abs(float(means.sum())) - _SAME * float(abs(means).sum())
     return float(extreme.mean() if is_exact else (extreme.sum() + 1) / (PERMUTATIONS + 1))
 
 
@@ -145,57 +145,60 @@ def _random_signs(n: int) -> Floats:
 def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
     """Return p-values adjusted for their number by Holm's step-down procedure.
 
-    A test is significant at a level, together with all others of its family, where its
-    adjusted value is not above that level.
+    A test is significant at a family-wise level where its adjusted value is not above that level.
 
     Args:
-        p_values: p-value of each test `(m,)`; nan for tests that could not be made, which do not
-            count.
+        p_values: p-value of each test `(m,)`; nan for tests that could not be made; these are
+            ignored.
         family: Declared family of each test `(m,)`; by default all belong to one.
 
     Returns:
-        Adjusted p-values `(m,)`, at most 1; nan stays nan.
+        Adjusted p-values `(m,)`, at most 1; nan where the input is nan.
 
     References:
         Holm, Scand. J. Stat. 6 (1979) 65-70.
     """
     values = np.asarray(p_values, dtype=float)
     adjusted = np.full(len(values), np.nan)
-    for ours in _by_family(values, family):
-        stepped = np.arange(len(ours), 0, -1) * values[ours]
-        adjusted[ours] = np.minimum(1.0, np.maximum.accumulate(stepped))
+    for members in _by_family(values, family):
+        stepped = np.arange(len(members), 0, -1) * values[members]
+        adjusted[members] = np.minimum(1.0, np.maximum.accumulate(stepped))
     return adjusted
 
 
 def holm_levels(
     p_values: ArrayLike, family: ArrayLike | None = None, alpha: float = 1 - LEVEL
 ) -> Floats:
-    """Return the level at which Holm's procedure decides on each test: a fraction of `alpha`.
+    """Return the level at which Holm's procedure decides on each test, a fraction of `alpha`.
 
-    A test is significant where its own p-value is not above this level, which is when its value
-    by `holm` is not above `alpha`. So an interval of this level agrees with the verdict.
+    A test is significant where its unadjusted p-value is not above this level, or equivalently,
+    where its value by `holm` is not above `alpha`. An interval at this level agrees with the
+    verdict.
 
     Args:
-        p_values: See `holm` `(m,)`.
-        family: See `holm` `(m,)`.
-        alpha: Chance of any false alarm in a family.
+        p_values: As in `holm` `(m,)`.
+        family: As in `holm` `(m,)`.
+        alpha: Family-wise error rate.
 
     Returns:
         Levels `(m,)`; nan for tests that could not be made.
     """
     values = np.asarray(p_values, dtype=float)
     levels = np.full(len(values), np.nan)
-    for ours in _by_family(values, family):
-        left = np.arange(len(ours), 0, -1)
-        fails = np.flatnonzero(left * values[ours] > alpha)
-        left[fails[0] if len(fails) else len(left) :] = left[fails[0]] if len(fails) else 1
-        levels[ours] = alpha / left
+    for members in _by_family(values, family):
+        # Holm's divisors: m, m - 1 ...; after the first failure all tests fail at its level.
+        count = np.arange(len(members), 0, -1)
+        failing = np.flatnonzero(count * values[members] > alpha)
+        count[failing[0] if len(failing) else len(count) :] = (
+            count[failing[0]] if len(failing) else 1
+        )
+        levels[members] = alpha / count
     return levels
 
 
 def _by_family(values: Floats, family: ArrayLike | None) -> Iterator[NDArray[np.intp]]:
-    """Yield the places of each family's tests, by rising p-value, without those not made."""
+    """Yield the indices of each family's tests by ascending p-value, without nan."""
     families = np.zeros(len(values)) if family is None else np.asarray(family)
     for name in np.unique(families):
-        ours = np.flatnonzero((families == name) & ~np.isnan(values))
-        yield ours[np.argsort(values[ours], kind="stable")]
+        members = np.flatnonzero((families == name) & ~np.isnan(values))
+        yield members[np.argsort(values[members], kind="stable")]

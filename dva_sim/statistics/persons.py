@@ -1,4 +1,4 @@
-"""The simulated person as the cluster: what every interval here rests on."""
+"""The simulated person as the cluster on which every interval is based."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Interval:
     Attributes:
         mean: The estimate (a mean, a quantile, a share, a ratio ...).
         low: Lower end; nan where there are too few persons.
-        high: Upper end.
+        high: Upper end; nan where there are too few persons.
         n_persons: Number of persons.
     """
 
@@ -39,14 +39,14 @@ class Interval:
 
 
 def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Floats]:
-    """Return each person's mean over the trials that gave a number.
+    """Return each person's mean over the trials with a value.
 
     Args:
         values: One value per run `(n,)`, nan where missing.
         person: Person of each run `(n,)`.
 
     Returns:
-        The persons `(m,)`, sorted, and their means `(m,)`; nobody without a value.
+        The persons with a value `(m,)`, sorted, and their means `(m,)`.
     """
     numbers = np.asarray(values, dtype=float)
     person_of_row = np.asarray(person)
@@ -57,7 +57,7 @@ def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Fl
 
 
 def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats, Floats]:
-    """Return each person's means of two treatments, over the trials that gave both.
+    """Return each person's means of two treatments, over the trials with both values.
 
     Returns:
         Means of `a` `(m,)` and of `b` `(m,)`, person by person.
@@ -78,7 +78,7 @@ def students_t(level: float, n: int) -> float:
 
 @functools.lru_cache(maxsize=8)
 def draws(persons: int, resamples: int, seed: int = 1) -> Floats:
-    """Return how often each resample draws each person, `(resamples, persons)`."""
+    """Return the number of times that each resample draws each person, `(resamples, persons)`."""
     rng = np.random.Generator(np.random.PCG64(seed))
     chances = np.full(persons, 1 / persons)
     weights = rng.multinomial(persons, chances, size=resamples).astype(float)

@@ -13,12 +13,12 @@ from dva_sim.statistics.persons import LEVEL, Floats, Interval, students_t
 def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
     """Return the share of flags that are set, with Korn and Graubard's interval.
 
-    Runs of one person are worth less than as many runs of different persons: the number of
-    runs is divided by how much the variance between persons exceeds that of independent
-    runs. Where all runs agree nothing can be learnt of that, and each person counts once.
+    Runs of the same person carry less information than runs of different persons: the number of
+    runs is divided by the ratio of the variance, estimated from persons, to that of independent
+    runs. If all runs agree, the ratio cannot be estimated, and each person counts as one run.
 
     Args:
-        flags: True where it happened `(n,)`; nan or None where the run is missing.
+        flags: True or False per run `(n,)`; nan or None where the run is missing.
         person: Person of each run `(n,)`.
 
     References:
@@ -32,13 +32,13 @@ def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
 
 
 def interval_of_share(share: float, variance: float, persons: int, runs: int) -> Interval:
-    """Return Clopper and Pearson's interval on as many runs as would have this variance.
+    """Return Clopper and Pearson's interval for the number of independent runs with this variance.
 
     Args:
         share: The estimate.
         variance: Variance of the estimate, from the differences between persons.
-        persons: The least number of runs that it counts as; of one, the ends are nan.
-        runs: The greatest.
+        persons: Number of persons, the minimum effective number of runs; the ends are nan for one.
+        runs: Number of runs, the maximum effective number.
     """
     from scipy import special
 
@@ -53,11 +53,12 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
 
 
 def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> Interval:
-    """Return a quantile of all runs, between the values whose own shares are compatible with it.
+    """Return a quantile of all runs, with the interval by Woodruff.
 
-    Few persons may not bound a high quantile: if all of them can lie below it
-    by chance, the upper end is infinite. With 24 persons and 5 trials the 95th percentile of runs
-    that hardly cluster has two ends, and mostly one where the trials of each are much alike.
+    The interval holds the values for which `q` lies in the interval of the share of runs below.
+    Few persons may not bound a high quantile: if all of them can lie below it by chance, the upper
+    end is infinite. With 24 persons of 5 trials the 95th percentile usually has a finite upper end
+    if runs hardly cluster, and usually none if the trials of each person are much alike.
 
     Args:
         values: One value per run `(n,)`, nan where missing.
@@ -82,7 +83,7 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
 
 
 def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.intp], int]:
-    """Return numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
+    """Return the present values `(n,)`, the person's index of each `(n,)`, and their number."""
     numbers = np.asarray(values, dtype=float)
     person_of_row = np.asarray(person)
     is_finite = np.isfinite(numbers)
@@ -100,7 +101,7 @@ def _variance(flags: Floats, code: NDArray[np.intp]) -> float:
 
 
 def _runs_worth(share: float, variance: float, persons: int, runs: int) -> float:
-    """Return the number of equivalent independent runs, reduced as the variance is estimated."""
+    """Return the effective number of runs, reduced because the variance is an estimate."""
     if not 0 < share < 1:
         n = float(persons)
     else:
