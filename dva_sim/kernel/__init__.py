@@ -1,4 +1,4 @@
 """Foundations: clock, random streams, recorder, configuration, plug-ins, errors.
 
-It imports no other room. Begin reading at `clock` and `streams`, then at `config`.
+The package imports no other package. Begin reading at `clock` and `streams`, then at `config`.
 """

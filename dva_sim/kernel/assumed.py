@@ -1,7 +1,7 @@
-"""Numbers that nobody has measured: each is a key with a default, a band and a reason.
+"""Assumed numbers, which nobody has measured: each is a key with a default, a band and a reason.
 
-A field says so beside its type: `Annotated[float, Assumed(0.2, 0.6, "reason")]`. From these notes
-come the list of all assumptions and what a screening of a study varies.
+A field is marked beside its type: `Annotated[float, Assumed(0.2, 0.6, "reason")]`. The list of all
+assumptions and the factors of a screening come from these marks.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from dva_sim.kernel.units import unit_of
 
 @dataclass(frozen=True)
 class Assumed:
-    """A band of plausible values, and why it is that one.
+    """A band of plausible values, with the reason for it.
 
-    A value beyond the band is accepted as long as it has the sign of the band.
+    A value outside of the band is accepted if it has the sign of the band.
 
     Attributes:
         low: Lower end of the band; zero or above.
-        high: Upper end.
+        high: Upper end of the band.
         why: Reason for the band, in one sentence.
     """
 
@@ -38,7 +38,7 @@ class Assumed:
     ) -> CoreSchema:
         """Return the schema of the field.
 
-        A number must be above zero, or not below if the band has it.
+        A number must be positive; zero is allowed if the band contains it.
         """
         schema = handler(source)
         if schema["type"] in ("float", "int"):
@@ -52,7 +52,7 @@ class Assumption:
 
     Attributes:
         key: Dotted key of a scenario, as for `--set` and for a factor of a study.
-        default: Value unless something else is set.
+        default: Value if the key is not set.
         low: Lower end of its band.
         high: Upper end.
         why: Reason for the band.
@@ -68,14 +68,14 @@ class Assumption:
 
     @property
     def unit(self) -> str:
-        """The unit, as printed; empty for a plain number."""
+        """Unit as printed; empty for a plain number."""
         return unit_of(self.key.removesuffix(".median"))
 
 
 def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> Iterator[Assumption]:
-    """Yield all assumptions in a model and below, in its order; of a trait its median counts.
+    """Yield all assumptions of a model and its parts, in order; a trait counts by its median.
 
-    In a scenario a median has a key of its own; in a profile (`depth` 1) the trait's key is it.
+    In a scenario a median has a key of its own; in a profile (`depth` 1) it is the trait's key.
 
     Args:
         model: Model of a file, or of a part of one.
@@ -93,10 +93,10 @@ def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> I
 
 
 class OmitsUnset(Config):
-    """A configuration that is written without the parts of it in which nothing was set.
+    """A configuration that is written without parts in which no key was set.
 
     Attributes:
-        omitted: Keys that are left out as well while they are empty.
+        omitted: Further keys that are left out if empty.
     """
 
     omitted: ClassVar[tuple[str, ...]] = ()
@@ -111,7 +111,7 @@ class OmitsUnset(Config):
 class Sparse(Config):
     """Configuration of which only explicitly set keys are written.
 
-    Whatever was left out takes the default of the program, or of the profile that it changes.
+    Keys that are left out take the default of the program, or of the profile that is changed.
     """
 
     @model_serializer(mode="wrap")
@@ -119,7 +119,7 @@ class Sparse(Config):
         return {key: value for key, value in handler(self).items() if key in self.model_fields_set}
 
     def changed_by(self, other: Sparse) -> Sparse:
-        """Return a copy with every key that `other` was given."""
+        """Return a copy with every key that is set in `other`."""
         changes = {name: getattr(other, name) for name in other.model_fields_set}
         inner = {
             name: getattr(self, name).changed_by(value)

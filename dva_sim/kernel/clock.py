@@ -1,4 +1,4 @@
-"""The one clock: SimPy in whole microseconds, seen by everyone else in seconds.
+"""The clock of a run: SimPy in whole microseconds, with an interface in seconds.
 
 Whole microseconds make simultaneous events exactly simultaneous (no 0.1 + 0.2), so the order of a
 run does not depend on rounding, and periodic events do not drift. Callbacks are put into SimPy's
@@ -20,11 +20,11 @@ Action = Callable[..., object]
 
 
 class Agenda(simpy.Environment):
-    """SimPy's environment, with plain calls in its queue beside its events.
+    """SimPy's environment, whose queue also holds plain calls.
 
     Attributes:
-        queue: SimPy's queue: time [us], priority, number, and an event, or a call and its
-            arguments.
+        queue: SimPy's queue. An entry has a time [us], a priority, a number, and an event or the
+            function and arguments of a call.
     """
 
     def __init__(self) -> None:
@@ -32,29 +32,29 @@ class Agenda(simpy.Environment):
         self.queue: list[Any] = self._queue
 
     def call(self, at: int, action: Action, arguments: tuple[Any, ...]) -> None:
-        """Put a call there, due at a time [us] that is not past, after all that is due then."""
+        """Queue a call, due at a time [us] that is not past, after all entries for that time."""
         heappush(self.queue, (at, NORMAL, next(self._eid), (action, arguments)))
 
     def step(self) -> None:
-        """Let the next event happen, or make the next call."""
+        """Process the next event or make the next call."""
         entry = heappop(self.queue)
         self._now, _, _, due = entry
         if type(due) is tuple:
             action, arguments = due
             action(*arguments)
         else:
-            heappush(self.queue, entry)
+            heappush(self.queue, entry)  # SimPy takes its events from the queue itself
             super().step()
 
 
 class Clock:
     """Virtual time of one run.
 
-    Times are seconds [s] since the run's start; they are kept to the microsecond.
+    Times are seconds since the start of the run, with a resolution of a microsecond.
 
     Attributes:
         env: SimPy's environment, in microseconds.
-        now: Seconds since the start [s].
+        now: Time since the start [s].
     """
 
     def __init__(self) -> None:
@@ -63,12 +63,12 @@ class Clock:
         self._now_us = 0
 
     def call_at(self, time: float, action: Action, *args: Any) -> None:
-        """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
+        """Run `action(*args)` at `time` [s], or as soon as possible if it is past."""
         at = round(time * US)
         self.env.call(at if at > self._now_us else self._now_us, action, args)
 
     def on_suspended(self, handler: Callable[[float], object]) -> None:
-        """Call `handler` with how long the machine was suspended [s]; virtual time never is."""
+        """Register a handler for the duration of suspensions [s]; virtual time has none."""
 
     def call_after(self, delay: float, action: Action, *args: Any) -> None:
         """Run `action(*args)` after `delay` [s]."""
@@ -92,7 +92,7 @@ class Clock:
         call(at, tick, ())
 
     def run(self, until: float) -> None:
-        """Let time pass up to `until` [s]; what is due then happens when time goes on."""
+        """Run all events before `until` [s]; events due at that time run in the next call."""
         end = round(until * US)
         if until > self.now:
             queue = self.env.queue
@@ -102,12 +102,12 @@ class Clock:
             self._set(end)
 
     def step(self) -> None:
-        """Let the next event happen."""
+        """Process the next event."""
         self._now_us = at = self.env.queue[0][0]
         self.now = at / US
         self.env.step()
 
     def _set(self, now: int) -> None:
-        """Set the time [us], before which nothing is due."""
+        """Set the time [us]; no earlier events may be due."""
         self._now_us = now
         self.now = now / US

@@ -1,8 +1,8 @@
 """Check a file against a pydantic model; mistakes are reported by key.
 
-Errors found by pydantic are reported without Python terms: the mistake, and the correct form. An
-unknown key is answered with the one that was meant: beside it, elsewhere in the file, or by another
-name. `Key` and `AlsoCalled` say at a field how a key is called.
+Errors of pydantic are reported without Python terms: the mistake and the correct form. For an
+unknown key, the key that was probably meant is suggested: a similar one, one at another place, or
+one known by another name. `Key` and `AlsoCalled` annotate a field with its names.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class AlsoCalled:
-    """Names that people try for a key, beside the key itself: `Annotated[int, AlsoCalled("n")]`."""
+    """Other names that people try for a key: `Annotated[int, AlsoCalled("n")]`."""
 
     names: tuple[str, ...]
 
@@ -50,13 +50,13 @@ class AlsoCalled:
 
 @dataclass(frozen=True, eq=False)
 class Key:
-    """Name of a key where people read it: `Annotated[float, Key("one-way delay")]`.
+    """Readable name of a key: `Annotated[float, Key("one-way delay")]`.
 
     Attributes:
         title: Name as a factor of a study.
-        stated: In the table of what was the same for all that is compared: whether it is there,
-            or the words for it there.
-        inner: Names of keys below it that depend on this place.
+        stated: Name in a report's table of common conditions; True for the title, False if it is
+            not in that table.
+        inner: Names of keys below it, where they depend on the key above.
     """
 
     title: str = ""
@@ -65,12 +65,12 @@ class Key:
 
     @property
     def condition(self) -> str:
-        """Its words in a table of conditions; empty if it has no place there."""
+        """Name in a table of common conditions; empty if it is not in that table."""
         return self.stated if isinstance(self.stated, str) else self.title if self.stated else ""
 
 
 def titled_keys(model: Any) -> dict[str, Key]:
-    """Return every dotted key of a model that says how it is called, in the order of the model."""
+    """Return every dotted key of a model that has a readable name, in the order of the model."""
     values: dict[str, Key] = {}
     for path, info in fields_below(model):
         for key in (m for m in info.metadata if isinstance(m, Key)):
@@ -80,12 +80,12 @@ def titled_keys(model: Any) -> dict[str, Key]:
 
 
 def meant(path: KeyPath, value: Any, *models: Any) -> str:
-    """Suggest what to write instead of an unknown key: `did you mean 'x'?`, or the known keys.
+    """Suggest a replacement of an unknown key: `did you mean 'x'?`, or list the known keys.
 
     Args:
         path: The key as it was given.
         value: Value given for the key.
-        models: Models that the file may have; the first has the place of the key.
+        models: Models that the file may follow; the first contains the key's parent.
     """
     keys = keys_meant(path, value, *models)
     if keys:
@@ -93,41 +93,41 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
         unit_written = str(path[-1]).rpartition("_")[2]
         text = f" (in {_UNITS[unit]})" if unit in _UNITS and unit_written != unit else ""
         return f"did you mean {either(map(repr, keys))}?{text}"
-    here = fields_at(models[0], path[:-1])
-    return f"known here: {listed(sorted(here), most=24)}" if here else ""
+    siblings = fields_at(models[0], path[:-1])
+    return f"known here: {listed(sorted(siblings), most=24)}" if siblings else ""
 
 
 def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
     """Return the keys that an unknown key may mean, for the same arguments as `meant`."""
     given = str(path[-1])
-    here = fields_at(models[0], path[:-1])
+    siblings = fields_at(models[0], path[:-1])
     key_by_name = {} if isinstance(value, Mapping) else _every_name(models)
     exact = [
         key for name, key in key_by_name.items() if plain_name(name) == plain_name(_dotted(path))
     ]
     if exact:
         return exact
-    beside = {name: name for name in here} | {
-        other: name for name, info in here.items() for other in _others(info)
+    beside = {name: name for name in siblings} | {
+        other: name for name, info in siblings.items() for other in _alternative_names(info)
     }
     near = guess(given, beside)
     return _elsewhere(path, key_by_name) if near is None else [beside[near]]
 
 
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
-    """Return the fields of the model that stands at `path` inside `model`, by name."""
+    """Return the fields of the model at `path` inside `model`, by name."""
     for number, step in enumerate(path, 1):
         if isinstance(step, int):
             continue
         info = _fields(model).get(step)
-        if info is not None:  # None: the step is a key of the user's in a mapping to models
+        if info is not None:  # None: the step is a user's own key in a mapping of models
             is_item = isinstance(next(iter(path[number:]), None), int)
             model = (None if is_item else _keyed(info)) or model_in(info.annotation)
     return _fields(model)
 
 
 def _keyed(info: Any) -> Any:
-    """Return the model of a list that may be given as a mapping instead; None: it may not."""
+    """Return the model of a list that may also be given as a mapping; None for other fields."""
     return next((m.keyed for m in info.metadata if hasattr(m, "keyed")), None)
 
 
@@ -143,16 +143,16 @@ def model_in(annotation: Any) -> Any:
 
 
 def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
-    """Return all dotted keys by their names, and by what else they are called."""
+    """Return all dotted keys by their own names and their alternative names."""
     key_by_name: dict[str, str] = {}
     for key, info in (item for model in models for item in fields_below(model)):
-        for name in (key, *_others(info)):
+        for name in (key, *_alternative_names(info)):
             key_by_name.setdefault(name, key)
     return key_by_name
 
 
 def _elsewhere(path: KeyPath, key_by_name: Mapping[str, str]) -> list[str]:
-    """Return keys of the same name in other places, or the most similar one."""
+    """Return keys of the same name at other places, or the most similar one."""
     last = plain_name(str(path[-1]))
     names = {name: plain_name(name.rpartition(".")[2]) for name in key_by_name}
     near = last if last in names.values() else guess(last, names.values())
@@ -182,13 +182,13 @@ def _fields(model: Any) -> dict[str, Any]:
     return fields | (dict(further().model_fields) if further is not None else {})
 
 
-def _others(info: Any) -> tuple[str, ...]:
+def _alternative_names(info: Any) -> tuple[str, ...]:
     return tuple(n for m in info.metadata if isinstance(m, AlsoCalled) for n in m.names)
 
 
 _SHOWN = 60  # maximum characters shown of a value
 
-# What a value should be, by what pydantic says that it is not.
+# Descriptions of valid values, by the error type of pydantic.
 _KINDS = {
     "float_type": "a number",
     "int_type": "a whole number",
@@ -215,7 +215,7 @@ _BOUNDS = {
 def first_mistake(
     model: type[BaseModel], data: Mapping[str, Any], errors: Sequence[Any]
 ) -> tuple[str, KeyPath]:
-    """Return the first mistake, and the path of the key that it is about.
+    """Return the first mistake, and the path of its key.
 
     Args:
         model: Model of the data.
@@ -237,7 +237,7 @@ def first_mistake(
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
-    """Return the path of a key, without the names of alternative kinds of a value."""
+    """Return the path of a key, without the union members that pydantic adds."""
     loc = problem["loc"]
     if loc and loc[-1] in _PLAIN and problem["type"].endswith("_type"):
         loc = loc[:-1]
@@ -259,9 +259,9 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
 
 
 def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
-    """Return one mistake in words, from all errors found at its place.
+    """Return one mistake in words, from all errors at its path.
 
-    One for each kind allowed.
+    Pydantic reports an error for each type of a union.
     """
     key = _dotted(path)
     first = problems[0]
@@ -286,7 +286,7 @@ def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
 
 
 def _measure(info: Any, name: str, problem: Any) -> str:
-    """Return the unit of a bound: that of the key's name, or a share if the maximum is 1."""
+    """Return the unit of a bound, by the key's name; that of a maximum of 1 is a share."""
     unit = name.rpartition("_")[2]
     if unit in _UNITS and unit != name:
         return f" {_UNITS[unit]}"
@@ -296,7 +296,7 @@ def _measure(info: Any, name: str, problem: Any) -> str:
 
 
 def _given(problem: Any, message: str) -> str:
-    """Return the present value, unless it is long or was stated already."""
+    """Return the given value for a message, unless it is long or already in it."""
     value = problem["input"]
     if value is None:
         return ", not null" if problem["type"] != "value_error" else ""
@@ -309,7 +309,7 @@ def _given(problem: Any, message: str) -> str:
 
 
 def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
-    """Suggest what to write instead, where that can be guessed."""
+    """Suggest a correction, if one can be guessed."""
     value = problems[0]["input"]
     kinds = {problem["type"] for problem in problems}
     if isinstance(value, str) and "float_type" in kinds:
@@ -325,7 +325,7 @@ def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
 
 
 def _in_words(problems: Sequence[Any]) -> str:
-    """Describe what would be right, in words that need no Python."""
+    """Describe valid values without Python terms."""
     kinds = {problem["type"]: problem for problem in problems}
     first = kinds.get("finite_number", problems[0])
     if first["type"] in ("too_short", "too_long"):
@@ -344,7 +344,7 @@ def _in_words(problems: Sequence[Any]) -> str:
         return f"should be {_STRUCTURES[first['type']]}"
     allowed = [word for kind, word in _KINDS.items() if kind in kinds]
     if "float_type" in kinds and "int_type" in kinds:
-        allowed.remove(_KINDS["int_type"])  # which is a number, too
+        allowed.remove(_KINDS["int_type"])  # "a number" includes it
     if first["type"] in _KINDS and allowed:
         return f"should be {_or(allowed)}"
     message: str = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
@@ -372,11 +372,11 @@ def _tag(problem: Any) -> str:
 
 M = TypeVar("M", bound=BaseModel)
 Fail = Callable[[str, KeyPath], ConfigError]
-"""Makes the error for a problem at a key path."""
+"""Factory of the error for a problem at a key path."""
 
 
 def _make_strict(schema: Any) -> None:
-    """Let no number in a schema be read from something else; lists and paths may be."""
+    """Make numbers and truth values in a schema strict: no conversion from other types."""
     if isinstance(schema, dict):
         if schema.get("type") in ("int", "float", "bool"):
             schema["strict"] = True
@@ -388,16 +388,16 @@ def _make_strict(schema: Any) -> None:
 
 
 class Config(BaseModel):
-    """Base of all configuration: unknown keys are mistakes, values do not change.
+    """Base of all configuration: immutable, and unknown keys are mistakes.
 
-    Numbers are numbers: neither `true` nor `"2"` is one, and `2.0` is no whole number.
+    Numbers are not converted: `true` and `"2"` are not numbers, and `2.0` is not a whole number.
     """
 
-    # A schema is built when it is first needed: few programs need all of them.
+    # Deferred: schemas are slow to build, and few programs need all of them.
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        """Show only what differs from the defaults, so that a whole scenario fits on a screen."""
+        """Show only values that differ from the defaults, so that a scenario fits on a screen."""
         fields = type(self).model_fields
         for name, value in super().__repr_args__():
             info = fields.get(name or "")
@@ -422,7 +422,7 @@ def validate(
     Args:
         model: The pydantic model.
         data: Plain data.
-        error: Function that makes the error for a problem at a key path; normally `Document.error`.
+        error: Factory of the error for a problem at a key path; usually `Document.error`.
 
     Raises:
         ConfigError: the first mistake, with the key and what would be right.

@@ -1,4 +1,4 @@
-"""Configurations with some keys changed, as by `--set`; mistakes name their origin."""
+"""Configurations with changed keys, such as by `--set`; errors name the change at fault."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def build(
     complete: Callable[[M, Fail], M],
     locate: Callable[[dict[str, Any], Sequence[Path]], object] = lambda data, folders: None,
 ) -> M:
-    """Build a configuration with some keys changed; mistakes are reported with their place.
+    """Build a configuration with some keys changed.
 
     Args:
         model: Class of the configuration.
         source: A document or plain data.
         changes: New values by dotted key; a number chooses an item of a list.
         complete: Function that checks what the model alone cannot, and adds derived values.
-        locate: Lets files that the data names be found from the folders given.
+        locate: Function that resolves the files named by the data, in the given folders.
 
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, or what `complete` finds.
-            It has a place if the file is at fault, and the keys if changes of it are.
+            It has a line if the file is at fault, and keys if changes are at fault.
     """
 
     document = source if isinstance(source, Document) else None
@@ -59,7 +59,7 @@ def build(
     def make(some: Mapping[str, Any]) -> M:
         data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
         for key, value in some.items():
-            set_key(data, key, copy.deepcopy(value))  # which a later key may change
+            set_key(data, key, copy.deepcopy(value))  # a later key may change a part of it
         locate(data, [document.file.parent] if document else [])
         return complete(validate(model, data, fail), fail)
 
@@ -75,10 +75,10 @@ def blame(
     make: Callable[[Mapping[str, Any]], object],
     source: Document | Mapping[str, Any] | None = None,
 ) -> ConfigError:
-    """Attribute a mistake to the changes that cause it, without a place in a valid file.
+    """Attribute a mistake to the changes that cause it; drop its line if the file is valid.
 
     Args:
-        error: A mistake of all changes together.
+        error: Mistake of all changes together.
         changes: New values by dotted key.
         make: Function that builds the result from some of the changes; raises `ConfigError`.
         source: The file that is changed.
@@ -94,16 +94,16 @@ def blame(
     if not changes or mistake({}) is not None:
         return error
     without = {k: mistake({o: v for o, v in changes.items() if o != k}) for k in changes}
-    keys = [key for key, left in without.items() if left is None]
-    if not keys:  # there are several mistakes, or keys that are wrong together
-        keys = [key for key, left in without.items() if left and left.problem != error.problem]
+    keys = [key for key, rest in without.items() if rest is None]
+    if not keys:  # several mistakes, or a combination of keys
+        keys = [key for key, rest in without.items() if rest and rest.problem != error.problem]
     is_here = isinstance(source, Document) and error.file == str(source.file)
     place = (None, None, None) if is_here else (error.file, error.line, error.column)
     return ConfigError(error.problem, *place, tuple(keys) or tuple(changes))
 
 
 def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
-    """Return a mistake in changes given as `--set key=value`, stated in their words."""
+    """Return a mistake in changes as an error that quotes their `--set key=value`."""
     pair_by_key = {pair.partition("=")[0].strip(): pair for pair in pairs}
     if error.file is not None or not error.keys:
         return error

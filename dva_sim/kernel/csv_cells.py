@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from dva_sim.kernel.labels import HIDDEN
 
-ACTS: Final = r"^[=+\-@\t\r]"  # first characters that make a cell a formula
+ACTS: Final = r"^[=+\-@\t\r]"  # first characters by which spreadsheets recognise a formula
 HIDES: Final = "[" + "".join(map(chr, sorted(HIDDEN)[1:])) + "]"  # but for NUL, which ends SQL
 SHOWN: Final = "\ufffd"  # in the place of each character that hides
 

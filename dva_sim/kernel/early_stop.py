@@ -1,6 +1,6 @@
-"""Ctrl-C and SIGTERM before a command has begun: one line instead of a traceback of loading.
+"""Ctrl-C and SIGTERM during start-up: one line instead of an import traceback.
 
-It loads next to nothing itself, so that it is there first.
+This module imports almost nothing, so that it takes effect early.
 """
 
 import os
@@ -12,14 +12,14 @@ STOPPED: Final = "stopped; run the same command again"
 
 
 def end_at_once() -> None:
-    """Let a stop end the process from now on: nothing has begun that must be put in order."""
+    """Let Ctrl-C and SIGTERM end the process at once: nothing needs cleaning up yet."""
     for number in STOPS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _end)
 
 
 def raise_again() -> None:
-    """Let a stop raise `KeyboardInterrupt` from now on."""
+    """Let Ctrl-C and SIGTERM raise `KeyboardInterrupt` from now on."""
     for number in STOPS:
         if signal.getsignal(number) is _end:
             signal.signal(number, signal.default_int_handler)

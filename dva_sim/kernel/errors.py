@@ -1,6 +1,6 @@
-"""Exit codes of the program, one for each way in which a command can end.
+"""Exit codes of the program, and the errors that a caller may handle.
 
-Errors that a caller may handle; everything else is a bug and keeps its traceback.
+Any other exception is a bug and keeps its traceback.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class ExitCode(IntEnum):
 
     @property
     def meaning(self) -> str:
-        """In a few words, as help and the documentation say it."""
+        """Meaning in a few words, for help and documentation."""
         return _MEANINGS[self]
 
 
@@ -43,7 +43,7 @@ _MEANINGS: Final = {
 
 
 class DvaSimError(Exception):
-    """Base of all errors a user can cause and mend.
+    """Base of all errors that a user can cause and correct.
 
     Attributes:
         exit_code: Exit code of the command line.
@@ -53,20 +53,20 @@ class DvaSimError(Exception):
 
 
 class RunsFailed(DvaSimError):
-    """Runs failed, so there is nothing to go on with; the input was as it should be."""
+    """Failure of runs although the input was valid."""
 
     exit_code = ExitCode.RUNS_FAILED
 
 
 class ConfigError(DvaSimError):
-    """Bad input: one line that says where, what, and what would be right.
+    """Invalid input, in one line: place, mistake and correction.
 
     Args:
         problem: Mistake and correction, without a trailing full stop.
-        file: The file that holds the mistake, if one does.
+        file: File that contains the mistake, if any.
         line: Line in that file, counted from 1.
         column: Column in that line, counted from 1.
-        keys: Changed keys at fault, if the file alone is valid.
+        keys: Changed keys at fault, if the unchanged file is valid.
     """
 
     def __init__(
@@ -97,9 +97,9 @@ _LONGEST = 160  # maximum characters of a word
 
 
 def error_line(problem: object) -> str:
-    """Return a mistake as the command line says it.
+    """Return a mistake as the command line prints it.
 
-    One line, whatever a name or a file in it holds.
+    It is one line, even if a name or path in it contains line breaks.
     """
     words = (
         word if len(word) <= _LONGEST else f"{word[:_LONGEST]}..." for word in str(problem).split()
@@ -108,4 +108,4 @@ def error_line(problem: object) -> str:
 
 
 class RunTooLong(BaseException):
-    """A run has taken too long. No `Exception`, so that no policy takes it for its own."""
+    """Time limit of a run. Not an `Exception`, so that no policy's `except` catches it."""

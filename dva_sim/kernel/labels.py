@@ -1,4 +1,4 @@
-"""Labels that people can tell apart: nothing in them is invisible, and no two look the same."""
+"""Labels that people can tell apart: without invisible characters, and no two look the same."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 LONGEST: Final = 64  # maximum characters of a label in a message
-# Letters and marks that are drawn as nothing, or as a gap, though they count as printable:
+# Letters and marks that are drawn as nothing or as a gap, although `isprintable` accepts them:
 # Unicode's Default_Ignorable_Code_Point beyond the format characters, and the empty Braille cell.
 _BLANK: Final = frozenset(
     [
@@ -35,9 +35,9 @@ HIDDEN = {
 
 
 def visible(text: str) -> str:
-    r"""Return the text with an escape, such as `\u202e`, for each character that is invisible.
+    r"""Return the text with an escape, such as `\u202e`, for each invisible character.
 
-    Those change the direction of text, too, and end lines.
+    Characters that change the direction of text or end a line count as invisible.
     """
     if text.isascii() and text.isprintable():
         return text
@@ -53,7 +53,7 @@ def look_of(label: str) -> str:
 
 
 def with_id(label: str, id_tag: str) -> str:
-    """Return a label that no other device has, no longer than a message may hold."""
+    """Return a unique label, made with the device's id and cut to the limit of messages."""
     beside = f" ({id_tag})"
     visible_label = visible(label).strip()[: LONGEST - len(beside)]
     return f"{visible_label}{beside}" if visible_label else id_tag

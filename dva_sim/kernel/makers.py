@@ -1,4 +1,4 @@
-"""Named tuples made in half the time, for those of every message, picture and tick."""
+"""Fast construction of the named tuples made for every message, picture and tick."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Measures: each column of a table, described once, beside the code that computes it.
 
-Tables, their dictionary, the words of reports and the measures of studies all follow from these
-objects. The unit is the end of the name, see `units`.
+Tables, data dictionaries, reports and the measures of studies are derived from these objects. The
+unit is the ending of the name, see `units`.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ class Measure:
     Attributes:
         name: Name of the column; it ends in the unit.
         meaning: Meaning in words, for the data dictionary.
-        title: In reports; left out, the name without its unit.
-        better: Better direction, where one has to be chosen.
-        awaits: Event that a duration waits for, such as `confirmation`. A run in which it never
-            comes counts with the whole time available.
-        low: The least value possible; left out, as the name and the unit say.
-        high: The greatest value possible; likewise.
-        is_number: True for numbers; only they can be requested.
+        title: Name in reports; by default the name without its unit.
+        better: Direction of improvement, where one can be stated.
+        awaits: Event that a duration waits for, such as `confirmation`. A run without it counts
+            with the whole time available.
+        low: Minimum possible value; by default derived from the name and the unit.
+        high: Maximum possible value; likewise.
+        is_number: True for numbers; other columns cannot be requested as measures.
     """
 
     name: str
@@ -54,14 +54,14 @@ class Measure:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The least and the greatest value that it can have."""
+        """Minimum and maximum possible value."""
         is_share = self.name.endswith("_share")
         low = 0.0 if is_share or self.unit in _NEVER_NEGATIVE else -math.inf
         high = 1.0 if is_share else math.inf
         return low if self.low is None else self.low, high if self.high is None else self.high
 
     def as_json(self) -> dict[str, Any]:
-        """Return its description for a results folder, readable without its class."""
+        """Return the description for a results folder, readable without this class."""
         values = {"meaning": self.meaning, "title": self.title, "better": self.better}
         return values | ({} if self.is_number else {"is_number": False})
 
@@ -71,7 +71,7 @@ Columns = Mapping[str, tuple[Measure, ...]]
 
 
 def text(name: str, meaning: str) -> Measure:
-    """Return a column of words, which nobody can ask for as a measure."""
+    """Return a column of text, which cannot be requested as a measure."""
     return Measure(name, meaning, is_number=False)
 
 

@@ -1,6 +1,7 @@
 """Options of plug-ins from a configuration, checked before anything runs.
 
-Each function takes an option's name and value; it returns the value, or names the valid values.
+Each function takes an option's name and value. It returns the value, or raises an error that
+names the valid values.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ def number(
     most: float = math.inf,
     below: float = math.inf,
 ) -> float:
-    """Return a finite number within bounds, each of which may be left out.
+    """Return a finite number within optional bounds.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: the value is not such a number.
     """
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     fits = is_number and least <= value <= most and above < value < below
@@ -38,7 +39,7 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
     """Return a whole number within bounds.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: the value is not such a number.
     """
     if type(value) is not int or not least <= value <= most:
         raise _wrong(name, value, f"a whole number from {least} to {most}")
@@ -46,10 +47,10 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 
 
 def one_of(name: str, value: Any, words: Collection[str]) -> str:
-    """Return one of some words.
+    """Return a value that is one of the allowed words.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: it is not one of them.
     """
     if not isinstance(value, str) or value not in words:
         raise _wrong(name, value, f"one of {', '.join(sorted(words))}")
@@ -57,10 +58,10 @@ def one_of(name: str, value: Any, words: Collection[str]) -> str:
 
 
 def some_of(name: str, value: Any, allowed: Collection[str]) -> frozenset[str]:
-    """Return any number of some words.
+    """Return a list of allowed words as a set.
 
     Raises:
-        ConfigError: not a list, or another word.
+        ConfigError: the value is not a list, or contains another word.
     """
     valid = f"a list of some of {', '.join(sorted(allowed))}"
     if isinstance(value, str) or not isinstance(value, Iterable):

@@ -1,4 +1,4 @@
-"""Classes of users by name: the shipped ones, one in a file, or an installed package's."""
+"""Plug-in classes by name: shipped, in a file, or from an installed package."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ A = TypeVar("A")
 
 FAILURES: Final = (Exception, SystemExit)  # errors of a plug-in: they must not end the program
 
-LIMIT_TOLERANCE: Final = 0.02  # share of a limit by which an answer may miss it
+LIMIT_TOLERANCE: Final = 0.02  # excess over a limit that counts as rounding, as a share of it
 
 
 @dataclass(frozen=True)
 class Plugins(Generic[T]):
-    """One kind of thing that users may add.
+    """One kind of plug-in.
 
     Attributes:
-        kind: Name of the kind: `policy`.
+        kind: Name of the kind, such as `policy`.
         base: Base class.
         shipped: Shipped classes, by name.
-        folder: Folder searched last: `agents/policies`.
-        group: Entry points of installed packages: `dva_sim.policies`.
-        key: Configuration key that names one: `dispatch.policy`.
-        needs: A method that a class must define, as it is written in a message.
+        folder: Folder that is searched last, such as `agents/policies`.
+        group: Group of entry points of installed packages, such as `dva_sim.policies`.
+        key: Configuration key that names a plug-in, such as `dispatch.policy`.
+        needs: Method that a class must define, as error messages write it.
         public: Module that users import `base` from.
         hidden: Shipped names that a configuration cannot use.
-        finish: Wrapper applied to a user's plug-in once made, such as one that enforces limits.
+        finish: Wrapper of a user's plug-in, such as one that enforces limits.
     """
 
     kind: str
@@ -58,9 +58,9 @@ class Plugins(Generic[T]):
     finish: Callable[[T], T] | None = None
 
     def known(self) -> list[str]:
-        """Return names that a configuration can use.
+        """Return the names of shipped and installed plug-ins that a configuration can use.
 
-        Shipped and installed ones; files come on top.
+        Names of files are not among them.
         """
         shipped = self.shipped.keys() - self.hidden
         return sorted(shipped | {entry.name for entry in self.installed()})
@@ -84,11 +84,11 @@ class Plugins(Generic[T]):
 
         Args:
             name: Name as for `find`.
-            options: Keyword arguments of its constructor, besides what it is given.
+            options: Further keyword arguments of its constructor.
             base: Folder as for `find`.
 
         Raises:
-            ConfigError: as `find`; a bad option is reported when it is made, as by `make`.
+            ConfigError: as by `find`; a bad option is reported later by the factory.
         """
         factory = self.find(name, base)
         kept_options = dict(options or {})
@@ -108,24 +108,24 @@ class Plugins(Generic[T]):
         """Return the class that a name means.
 
         Args:
-            name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under
-                which an installed package offers one. Or the class itself.
-            base: Folder that a file is looked for in first; then the working folder, and
+            name: Shipped name, class in a file such as `mine.py:Mine`, or entry point of an
+                installed package; or the class itself.
+            base: Folder in which a file is searched first, before the working folder and
                 `folder`.
 
         Raises:
-            ConfigError: there is none, or its file or package cannot be loaded, or it is of
-                another kind. The line says what would be right.
+            ConfigError: the name is unknown, its file or package cannot be loaded, or it is not
+                a plug-in of this kind.
         """
         if not isinstance(name, str):
             return self._right_class(word_of(name), name) if isinstance(name, type) else name
         return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
 
     def located(self, name: str, base: Path | None = None) -> str:
-        """Return the name with the full path of its file, if it is in one; see `find`.
+        """Return the name; that of a class in a file gets the file's full path, see `find`.
 
         Raises:
-            ConfigError: there is no such file.
+            ConfigError: the file does not exist.
         """
         file, colon, class_name = name.rpartition(":")
         if not colon or not file.endswith(".py"):
@@ -138,7 +138,7 @@ class Plugins(Generic[T]):
         """Make a plug-in of a loaded class, from its options and its fixed arguments.
 
         Raises:
-            ConfigError: an option is unknown or bad, or it cannot be made.
+            ConfigError: an option is unknown or invalid, or the constructor fails.
         """
         self._check_options(name, factory, options, len(arguments))
         return self.ask(name, lambda: factory(*arguments, **options))
@@ -147,7 +147,7 @@ class Plugins(Generic[T]):
         """Call code of a loaded plug-in, and report its errors.
 
         Raises:
-            ConfigError: it fails, or ends the program.
+            ConfigError: the code fails or tries to exit the program.
         """
         try:
             return what()
@@ -176,7 +176,7 @@ class Plugins(Generic[T]):
     # --- files -------------------------------------------------------------------------
 
     def _from_file(self, name: str, base: Path | None) -> type[T] | None:
-        """Return the class that `file.py:Class` means; None if the name is not of that form."""
+        """Return the class for `file.py:Class`; None if the name has another form."""
         file, colon, class_name = name.rpartition(":")
         if not colon and name.endswith(".py"):
             raise ConfigError(f"{self.kind} {name!r} should name a class too, as {name}:Mine")
@@ -232,7 +232,7 @@ class Plugins(Generic[T]):
 
 
 class Guard:
-    """Guard of a plug-in in a run; failures are counted, and the caller continues without it.
+    """Guard of a plug-in in a run: counts its failures, after which the caller does without it.
 
     Attributes:
         failures: Number of missing or invalid answers.
@@ -253,8 +253,8 @@ class Guard:
             self._count(error_text(error))
         return None
 
-    def _held(self, what: str, value: float, least: float, most: float) -> float:
-        """Clamp a value to its limits; count by how much it exceeds them beyond rounding."""
+    def _clamp(self, what: str, value: float, least: float, most: float) -> float:
+        """Clamp a value to its limits; count a violation beyond rounding."""
         if not least - LIMIT_TOLERANCE * most <= value <= most + LIMIT_TOLERANCE * most:
             self._count(f"{what} {value:.3g}; allowed is {least:.3g} to {most:.3g}")
         return min(max(value, least), most)
@@ -276,11 +276,11 @@ def error_text(error: BaseException) -> str:
 
 
 def _run(path: Path, kind: str) -> ModuleType:
-    """Run a file as a module of its own name, so that two files named alike do not meet."""
+    """Run a file as a module with a unique name, so that files of the same name do not clash."""
     unique = f"dva_sim_{kind}_{hashlib.sha256(bytes(path)).hexdigest()[:16]}"
     module = ModuleType(unique)
     module.__file__ = str(path)
-    sys.modules[unique] = module  # dataclasses look their module up there
+    sys.modules[unique] = module  # dataclasses look up their module here
     try:
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except SyntaxError as error:
@@ -295,7 +295,7 @@ def _run(path: Path, kind: str) -> ModuleType:
 
 
 def _line(error: BaseException, path: Path) -> int | None:
-    """Return the last line of the file that the error came through."""
+    """Return the last line of the file in the error's traceback; None if there is none."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if frame.filename == str(path)]
     return lines[-1] if lines else None

@@ -1,4 +1,4 @@
-"""Numbers written with a unit, and the number to write where a file wants it alone."""
+"""Conversion of numbers written with a unit to the plain number that a file expects."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _UNITS: Final[dict[str, dict[str, float]]] = {
 
 
 def as_number(key: str, text: str) -> str:
-    """Suggest the number that a text means as a key's value, as `0.5` for `500ms`; else empty."""
+    """Suggest the number for a text with a unit, such as `0.5` for `500ms`; empty if unclear."""
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
         return ""

@@ -3,12 +3,12 @@
 import gc
 
 NEW_OBJECTS = 20_000
-"""Objects made before Python looks for cycles among them; its own default is 700.
+"""Number of new objects that triggers a collection; Python's default is 700.
 
-Modules and their classes stay: looking at them again and again took a twelfth of the start.
+Modules and their classes are never freed: searching them for cycles took a twelfth of start-up.
 """
 
 
 def collect_rarely() -> None:
-    """Look for cycles less often in this process; only a process of ours should call it."""
+    """Collect cycles less often in this process; not for use inside other programs."""
     gc.set_threshold(NEW_OBJECTS, 20, 20)

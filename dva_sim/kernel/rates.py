@@ -1,4 +1,4 @@
-"""Growth rates of counts, as tables of what runs show them."""
+"""Growth rates of counts, for status displays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Rate:
         self._samples: deque[tuple[float, int]] = deque([(0.0, 0)], maxlen=int(RATE_OVER) + 1)
 
     def of(self, count: int, now: float) -> float:
-        """Return the growth per second over the last samples [1/s], asked for once a second."""
+        """Return the growth rate over the last samples [1/s]; to be called once a second."""
         self._samples.append((now, count))
         then, before = self._samples[0]
         return (count - before) / (now - then) if now > then else 0.0

@@ -1,4 +1,4 @@
-"""Keep contents of files in memory until the files change: the runs of a study share them."""
+"""Cache of file contents, shared by the runs of a study, until the files change."""
 
 from __future__ import annotations
 
@@ -19,31 +19,30 @@ def read_once(
     """Cache a function's results until one of its files changes.
 
     Args:
-        files: Function that returns the files of the first argument, such as a map and its image.
-        most: Number of results that are kept.
+        files: Function that returns the files behind the first argument, such as a map and its
+            image.
+        most: Maximum number of cached results.
     """
 
-    def keep(read: Callable[Asked, Read]) -> Callable[Asked, Read]:
+    def decorate(read: Callable[Asked, Read]) -> Callable[Asked, Read]:
         @lru_cache(maxsize=most)
         def kept(_: tuple[Version, ...], *arguments: Asked.args, **named: Asked.kwargs) -> Read:
             return read(*arguments, **named)
 
         @wraps(read)
-        def current(*arguments: Asked.args, **named: Asked.kwargs) -> Read:
+        def read_current(*arguments: Asked.args, **named: Asked.kwargs) -> Read:
             first = next(iter((*arguments, *named.values())))
             return kept(tuple(map(version_of, files(first))), *arguments, **named)  # type: ignore[arg-type]
 
-        return current
+        return read_current
 
-    return keep
+    return decorate
 
 
 def version_of(file: Path) -> Version:
-    """Return the path of a file, and numbers that differ after any change.
+    """Return the path of a file, and numbers that differ after any change; none if it is missing.
 
-    No numbers if it does not exist.
-
-    They include the time of the last status change, since tools that copy or unpack files set the
+    They include the time of the last status change: copying or unpacking a file can set its
     modification time back.
     """
     path = file.absolute()

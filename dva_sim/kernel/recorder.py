@@ -1,4 +1,4 @@
-"""Recorder of a run: a timeline for people, numbers for measures, broken rules counted."""
+"""Recorder of a run: timeline, data for measures, and breaches of safety rules."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Moment(NamedTuple):
 
     Attributes:
         time: Time [s].
-        who: The agent it is about.
+        who: Agent that the line is about.
         what: Description in words.
         kind: `event`, `order`, `drive`, `mode`, `link` or `safety`.
     """
@@ -46,9 +46,9 @@ class Sent(NamedTuple):
     Attributes:
         time: Time [s].
         source: Id of the sender.
-        destination: To whom.
-        size: With all framing [B].
-        payload: The XML as bytes, or the frame of a camera.
+        destination: Id of the receiver.
+        size: Size with all framing [B].
+        payload: XML as bytes, or a camera frame.
     """
 
     time: float
@@ -59,7 +59,7 @@ class Sent(NamedTuple):
 
 
 class Issued(NamedTuple):
-    """A command on its way.
+    """A command in transit.
 
     Attributes:
         made: Time at which the app made it from the tilt [s].
@@ -78,16 +78,16 @@ make_issued = maker(Issued)
 
 
 class Accepted(NamedTuple):
-    """A command that a robot accepted from any sender.
+    """A command that a robot accepted.
 
     Attributes:
         robot: Id of the robot.
         source: Sender according to the message.
         session: Session according to the message.
-        message_id: Its number.
-        seen_tick: The newest picture's time behind it, by the robot's own clock [ms].
+        message_id: Number of the message.
+        seen_tick: Tick of the newest picture its sender had seen, by the robot's clock [ms].
         arrived: Arrival time according to the robot [s].
-        time: Now [s].
+        time: Time of acceptance [s].
     """
 
     robot: str
@@ -103,11 +103,11 @@ make_accepted = maker(Accepted)
 
 
 class ByHand(NamedTuple):
-    """Action of a person who drives a robot by hand, at the robot itself, and is obeyed.
+    """Obeyed action of a person who drives a robot by hand, at the robot itself.
 
     Attributes:
         robot: Id of the robot.
-        who: The hand.
+        who: Name of the person.
         what: `takes`, `drives`, `lets go`, `stops` by the emergency button, `releases` after
             that, or `stands`, which the robot does by itself.
         time: Now [s].
@@ -127,7 +127,7 @@ class Applied(NamedTuple):
         sent: Time at which the pattern sent it.
         arrived: Time at which it reached the robot.
         time: Time at which it took effect.
-        until: Time at which it ceases to be in force, if no newer one comes.
+        until: Time at which it expires, unless a newer one replaces it.
         sample_age: Mean age of the tilt samples behind it when it was made.
         captured: Mean capture time of the pictures behind it.
     """
@@ -150,7 +150,7 @@ class Shown(NamedTuple):
     Attributes:
         captured: Capture time [s].
         time: Display time [s].
-        tick: The robot's own clock when it was taken [ms].
+        tick: Robot's clock at capture [ms].
     """
 
     captured: float
@@ -167,7 +167,7 @@ class Followed(NamedTuple):
     Attributes:
         captured: Capture time of that picture.
         shown: Display time of that picture.
-        time: From when on it is wanted.
+        time: Time from which it is wanted.
     """
 
     captured: float
@@ -182,11 +182,11 @@ class DrivenBy(NamedTuple):
     """Driver of a drive, and the driver's equipment, where these differ from the scenario's.
 
     Attributes:
-        person: A number and no name; empty of a simulated person.
+        person: Number, not a name; empty for a simulated person.
         pattern: Pattern that carried the commands.
         pipeline: Pipeline from tilt to commands.
         sensor_hz: Samples of a real phone per second, as measured.
-        link_delay_s: One-way delay of the link, as it was last set during the drive [s].
+        link_delay_s: One-way delay of the link, as last set during the drive [s].
         tour_time: Time for the leg of the guided tour that this drive ended, as its page measured
             it [s].
         contacts: Contacts of the robot during the drive; nan: not counted.
@@ -214,25 +214,25 @@ class DriveLog:
         ended: End of the drive [s].
         outcome: `confirmed`, `refuted`, `gave up`, `refused`, `lost link` or `timeout`.
         refused: Number of commands refused, by reply code, including those without a reply.
-        refusal: The code that ended it, if one did.
+        refusal: Reply code that ended the drive, if any.
         disturbed: Time of the scenario's disturbance [s].
-        round_trips: Time from each command's request to its reply [s]; none of what is published.
-        samples: Number of accelerometer samples, in all batches after which the phone's filter was
-            read.
+        round_trips: Time from each command's request to its reply [s]; empty for published
+            commands.
+        samples: Number of accelerometer samples in the batches that the phone's filter took.
         values: Number of such batches; 0 for a filter without batches.
-        applied: Commands in the order they took effect; those still under way when the
-            drive ended, too.
+        applied: Commands in the order in which they took effect, including those still in
+            transit when the drive ended.
         hand_lag: Time constant with which the hand follows what is wanted [s].
-        frames: Those shown, in order.
-        intents: Commands wanted, in order.
+        frames: Frames shown, in order.
+        intents: Commands that the operator wanted, in order.
         workload: Workload measures of the way of steering, such as `waits`.
         taken_up: Time at which the operator turned to the order [s].
-        attended: Time from when to when the operator looked at this robot's picture [s].
-        looks_since: From when on it has been looking [s]; None: it looks elsewhere.
-        turned_to: Number of times the operator turned to it from another order.
+        attended: Start and end of each look at this robot's picture [s].
+        looks_since: Start of the present look [s]; None if the operator looks elsewhere.
+        turned_to: Number of times the operator turned to this drive from another order.
         waits_from: Time at which the robot reached the place where its operator has to judge [s].
-        commands: Made from the tilt: when [s], speed [m/s], turn rate [rad/s].
-        ways: Those planned by the operator: when [s], points `(n, 2)` [m].
+        commands: Commands made from the tilt: time [s], speed [m/s], turn rate [rad/s].
+        ways: Routes planned by the operator: time [s], points `(n, 2)` [m].
         by: Driver and equipment, where people take part.
     """
 
@@ -268,9 +268,9 @@ class DriveLog:
     by: DrivenBy = SIMULATED
 
     def followed(self, tick: int, now: float) -> float:
-        """Return when the frame of that tick was captured [s], by which something is wanted.
+        """Record a wanted command based on the frame of a tick; return its capture time [s].
 
-        What is wanted by no frame, but by the truth, is by what is so now.
+        Without such a frame it is based on the true state, whose capture time is `now`.
         """
         for frame in reversed(self.frames):
             if frame.tick == tick:
@@ -302,7 +302,7 @@ class Breach:
 
 
 class Recorder:
-    """Collects; decides nothing.
+    """Collector of the data of a run, without any decisions.
 
     Args:
         keep_traffic: Also keep each message sent, for pictures and recordings.
@@ -310,9 +310,9 @@ class Recorder:
     Attributes:
         messages: Number of messages sent.
         bytes: Size of all messages sent [B].
-        counters: Whatever else is counted, by what it is.
+        counters: Other counts, by name.
         broken: First breach of each rule by each agent.
-        facts: Facts that the safety rules are judged by, in order; None: not kept.
+        facts: Facts for judging the safety rules, in order; None if not kept.
         on_accepted: Callback for each command that a robot accepts.
         on_hand: Callback for each action on a robot by hand.
     """
@@ -326,7 +326,7 @@ class Recorder:
         self.broken: dict[tuple[str, str], Breach] = {}
         self.facts: list[Any] | None = None
         self.drives: list[DriveLog] = []
-        self.newest_drive: dict[str, DriveLog] = {}  # of each robot
+        self.newest_drive: dict[str, DriveLog] = {}  # by robot
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
         self.traffic: list[Sent] | None = [] if keep_traffic else None
         self.exposure: dict[str, float] = defaultdict(float)
@@ -339,7 +339,7 @@ class Recorder:
         self.timeline.append(Moment(time, who, what, kind))
 
     def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
-        """Record where an operator believes a robot to be, if pictures are wanted."""
+        """Record the position that an operator assumes for a robot, if pictures are wanted."""
         if self.traffic is not None:
             self.views[robot].append(TrackPoint(time, x, y, heading, "seen"))
 
@@ -365,7 +365,7 @@ class Recorder:
         now: float,
         until: float,
     ) -> None:
-        """Record a command that takes effect, and stays in force `until` [s] at the latest."""
+        """Record a command that takes effect, and expires at `until` [s]."""
         issued = self._issued.pop((source, message_id), None)
         if issued is None:
             return

@@ -1,4 +1,4 @@
-"""Find what users edit: worlds, agents, experiments and the protocol, by path or by name."""
+"""Search for the files that users edit: worlds, agents, experiments and the protocol."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import guess, hint
 
 _PACKAGE = Path(__file__).parent.parent
-REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
+REGISTRATION = ".registration.yaml"  # ending of a registration, stored beside its study
 _RESULTS = "manifest.json"  # file in a results folder
 _TEXTS: Final = (".yaml", ".yml", ".csv", ".xsd")  # files that a name may mean
 
@@ -20,7 +20,7 @@ class FolderKind(NamedTuple):
     """Contents of a resource folder.
 
     Attributes:
-        word: Word for such a file.
+        word: Noun for such a file in messages.
         command: Command that takes such files, if any.
     """
 
@@ -42,9 +42,9 @@ KINDS: Final = {
 
 
 def roots() -> list[Path]:
-    """Return folders that may hold `worlds/`, `agents/`, ....
+    """Return the folders that may hold `worlds/`, `agents/` and so on, in order of precedence.
 
-    Working folder, source tree, wheel.
+    They are the working folder, the source tree and the installed package.
     """
     return [Path.cwd(), *_installed()]
 
@@ -57,7 +57,7 @@ def _installed() -> tuple[Path, ...]:
 
 
 def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
-    """Return all files of a kind by name; a nearer folder hides a farther one of the same name."""
+    """Return all files of a kind by name; of files with the same name, that of the first root."""
     names: dict[str, Path] = {}
     for root in roots():
         for path in sorted((root / folder).glob(pattern)):
@@ -78,17 +78,17 @@ def find(
     base: Path | None = None,
     is_asked: bool = False,
 ) -> Path:
-    """Return the file that `name` means: a path (also relative to `base`), or a name in `folder`.
+    """Return the file for a name: a path (also relative to `base`), or a name in `folder`.
 
     Args:
         name: `experiments/drive.yaml`, `drive.yaml` or just `drive`.
         folder: Folder below each root, for example `experiments` or `experiments/scenarios`.
-        suffix: Ending that a bare name stands for.
+        suffix: Ending that is added to a bare name.
         base: Folder of the file that mentions `name`.
-        is_asked: True if a user asks to use this one, and may have meant another command.
+        is_asked: True if a user named the file on the command line, perhaps with the wrong command.
 
     Raises:
-        ConfigError: nothing of that name; the message says what was meant, or what there is.
+        ConfigError: there is no such file; the message suggests a name or lists all.
     """
     for candidate in _candidates(name, folder, suffix, base):
         if is_file(candidate):
@@ -97,7 +97,7 @@ def find(
 
 
 def _missing(name: str, folder: str, names: list[str], is_asked: bool) -> str:
-    """Describe a missing file: others of its name, a similar name, or the available ones."""
+    """Describe a missing file: suggest files of the same or a similar name, or list all."""
     kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
     path = Path(name)
     other_kinds = {where: k for where, k in KINDS.items() if where != folder}
@@ -138,15 +138,15 @@ def refuse_to_replace(
     overwrite: bool = False,
     remedy: str = "give another name, or --overwrite",
 ) -> None:
-    """Refuse to lose anything that an earlier run or command left.
+    """Refuse to overwrite the output of an earlier run or command.
 
     Args:
         paths: Files to be written.
-        overwrite: The user has said that it may be replaced.
+        overwrite: True if the user allowed overwriting.
         remedy: Remedy to suggest to the user.
 
     Raises:
-        ConfigError: something is there.
+        ConfigError: a file exists.
     """
     existing = [path for path in paths if path.is_symlink() or path.exists()]
     if existing and not overwrite:
@@ -155,12 +155,12 @@ def refuse_to_replace(
 
 
 def is_file(path: Path) -> bool:
-    """Return True if there is such a file; False for names that no file can have."""
+    """Return True if the file exists; False also for names that no file can have."""
     return _is_there(path.is_file)
 
 
 def _is_there(look: Callable[[], bool]) -> bool:
-    """Evaluate a look at the disk; a name that no file can have counts as absent."""
+    """Evaluate a check on disk; a name that no file can have counts as absent."""
     try:
         return look()
     except (OSError, ValueError):

@@ -1,9 +1,9 @@
-"""Public names of earlier versions: modules that moved, and what replaces a retired name."""
+"""Public names of earlier versions: moved modules, and replacements of retired names."""
 
 import re
 from typing import Final
 
-# Named by pages and examples, and whole packages; names are relative to `dva_sim`.
+# Modules that documentation and examples named, and packages; all relative to `dva_sim`.
 MOVED: Final = {
     "agents.camera": "agents.observation",
     "agents.operator.person": "agents.population",
@@ -71,22 +71,22 @@ RETIRED: Final[dict[str, dict[str, str]]] = {
         "--transport": "ZeroMQ carries a run; the study `middleware` compares it with MQTT",
     },
 }
-"""By the kind of name, as messages call it: each retired name, and what to use instead."""
+"""Replacements of retired names, by the kind of name in messages."""
 
 
 def use_now(kind: str, name: str) -> str:
-    """Return a line on a retired name that says what to use instead; empty for any other name."""
+    """Return a line with the replacement of a retired name; empty for any other name."""
     instead = RETIRED.get(kind, {}).get(name)
     return f"{kind} {name!r} has been retired; {instead}" if instead else ""
 
 
 def import_now(error: BaseException) -> str:
-    """Say, for the end of a message, what to import instead of a moved or retired name."""
-    package, _, rest = (getattr(error, "name", "") or "").partition(".")
+    """Return the end of a message with the replacement of a moved or retired import."""
+    package, _, module = (getattr(error, "name", "") or "").partition(".")
     if not isinstance(error, ImportError) or package != "dva_sim":
         return ""
-    if rest in MOVED:
-        return f"; it is now dva_sim.{MOVED[rest]}"
+    if module in MOVED:
+        return f"; it is now dva_sim.{MOVED[module]}"
     name = re.match(r"cannot import name '(\w+)'", str(error))
     instead = RETIRED["name"].get(name[1]) if name else None
     return f"; it has been retired: {instead}" if instead else ""

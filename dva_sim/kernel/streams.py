@@ -28,7 +28,7 @@ class Streams:
         self._streams: dict[str, np.random.Generator] = {}
 
     def __getitem__(self, name: str) -> np.random.Generator:
-        """Return the stream of that name, begun once and then continued."""
+        """Return the stream of that name, which continues from its last use."""
         stream = self._streams.get(name)
         if stream is None:
             stream = self._streams[name] = self.fresh(name)

@@ -9,16 +9,16 @@ from typing import Final
 from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.wording import listing
 
-_LETTERS: Final = 3  # minimum letters of a beginning that identifies a name
+_LETTERS: Final = 3  # minimum letters of an abbreviation or a word with letters exchanged
 _A_SLIP: Final = 4  # letters per likely typing error
 _LISTED: Final = 12  # maximum names listed in one line
 
 
 def guess(given: str, known: Iterable[str]) -> str | None:
-    """Return the name that was meant; None if no guess is good.
+    """Return the known name that was probably meant; None without a good guess.
 
-    A good guess differs by few slips, has the name as half of it or more, or is the only one that
-    begins with it.
+    A good guess differs by few typing errors; or one of both begins with the other, and they have
+    similar lengths or there is no other such name.
     """
     plain_given = plain_name(given)
     names = list(known)
@@ -35,60 +35,60 @@ def guess(given: str, known: Iterable[str]) -> str | None:
     return halves[0] if halves else next(iter(begun)) if len(begun) == 1 else None
 
 
-def _is_half(one: str, other: str) -> bool:
-    return 2 * min(len(one), len(other)) >= max(len(one), len(other))
+def _is_half(first: str, second: str) -> bool:
+    return 2 * min(len(first), len(second)) >= max(len(first), len(second))
 
 
-def _begins(one: str, other: str) -> bool:
-    short, long = sorted((one, other), key=len)
+def _begins(first: str, second: str) -> bool:
+    short, long = sorted((first, second), key=len)
     return len(short) >= _LETTERS and long.startswith(short)
 
 
-def _slips(one: str, other: str) -> int:
-    """Return letters left out, put in, changed, or exchanged with the next.
+def _slips(first: str, second: str) -> int:
+    """Return the number of letters left out, inserted, changed, or exchanged with the next.
 
-    Many for another number.
+    Names that differ only in their number count as entirely different.
     """
-    if abs(len(one) - len(other)) > len(one) // _A_SLIP + 1 or _is_numbered(one, other):
-        return len(one) + len(other)
+    if abs(len(first) - len(second)) > len(first) // _A_SLIP + 1 or _is_numbered(first, second):
+        return len(first) + len(second)
     before = list[int]()
-    row = list(range(len(other) + 1))
-    for i, a in enumerate(one, 1):
+    row = list(range(len(second) + 1))
+    for i, a in enumerate(first, 1):
         above = before
         before = row
         row = [i]
-        for j, b in enumerate(other, 1):
+        for j, b in enumerate(second, 1):
             least = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
-            if i > 1 and j > 1 and (a, one[i - 2]) == (other[j - 2], b):
+            if i > 1 and j > 1 and (a, first[i - 2]) == (second[j - 2], b):
                 least = min(least, above[j - 2] + 1)
             row.append(least)
     return row[-1]
 
 
-def _is_numbered(one: str, other: str) -> bool:
-    """Return True if two names differ only in their number: robot-9 is no misspelt robot-1."""
+def _is_numbered(first: str, second: str) -> bool:
+    """Return True if two names differ only in their number, as robot-1 and robot-9."""
     digits = re.compile(r"[0-9]+")
-    return one != other and digits.sub("0", one) == digits.sub("0", other)
+    return first != second and digits.sub("0", first) == digits.sub("0", second)
 
 
 def hint(given: str, known: Iterable[str], heading: str = "known") -> str:
-    """Return `did you mean 'x'?`; if no guess is good what there is, but not too much of it."""
+    """Return `did you mean 'x'?`, or a list of known names without a good guess."""
     names = list(known)
     near = guess(given, names)
     return f"did you mean {near!r}?" if near is not None else f"{heading}: {listed(names)}"
 
 
 def unknown(what: str, given: object, known: Iterable[str], heading: str = "known") -> str:
-    """Say that a name is unknown, and suggest the closest one or list the known ones.
+    """Return a message that a name is unknown, with the closest known name or a list.
 
-    Of a retired name, say what to use instead.
+    For a retired name, it names the replacement.
     """
     instead = use_now(what, str(given))
     return instead or f"{what} {given!r} is unknown; {hint(str(given), known, heading)}"
 
 
 def listed(names: Iterable[object], most: int = _LISTED) -> str:
-    """Return names in a line; of many the first, and how many there are."""
+    """Return names in a line; beyond `most`, the first ones and the total number."""
     every = [str(name) for name in names]
     more = f", ... ({len(every)} in all)" if len(every) > most else ""
     return (", ".join(every[:most]) or "none") + more
@@ -100,5 +100,5 @@ def either(names: Iterable[object]) -> str:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without capitals and separators, which people mix up."""
+    """Return a name in lower case without separators, which people confuse."""
     return re.sub(r"[\s_.-]+", "_", name.casefold())

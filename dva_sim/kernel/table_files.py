@@ -1,7 +1,7 @@
-"""Tables in CSV files as spreadsheets and other programs save them.
+"""CSV files as saved by spreadsheets and other programs.
 
-Separated by commas, semicolons or tabs; where it is not the comma, all numbers may have a decimal
-comma. Blank lines do not count, and every mistake has its line and column.
+Cells are separated by commas, semicolons or tabs; unless commas separate them, numbers may have a
+decimal comma. Blank lines are ignored, and every mistake has its line and column.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Cell:
         return self.row[self.place].strip()
 
     def at(self, column: int) -> Cell:
-        """Return another cell of the row."""
+        """Return the cell of the row at a column."""
         return Cell(self.table, self.line, self.row, column)
 
     @property
@@ -44,8 +44,7 @@ class Cell:
         """Content of the cell with a decimal point.
 
         Raises:
-            ConfigError: it is a number with a point in a table of decimal commas, where 1.060 may
-                be a thousand.
+            ConfigError: it has a point in a table with decimal commas, where 1.060 may mean 1060.
         """
         if not self.table.has_commas:
             return self.text
@@ -57,7 +56,7 @@ class Cell:
         """Return the content as a finite number.
 
         Raises:
-            ConfigError: it is none; `what` says what it should be.
+            ConfigError: it is not a number; the message names it by `what`.
         """
         try:
             value = float(self.decimal)
@@ -80,9 +79,9 @@ class CsvTable:
 
     Attributes:
         file: File that it was read from.
-        names: Names of the columns, as the header says.
-        rows: Line of each row, and its cells: as many as there are names.
-        line: Line of the header.
+        names: Names of the columns, from the header.
+        rows: Line number and cells of each row; as many cells as names.
+        line: Line number of the header.
         has_commas: True if numbers have a decimal comma.
     """
 
@@ -107,8 +106,8 @@ def read_table(path: str) -> CsvTable:
     """Read a table, without checking its cells.
 
     Raises:
-        ConfigError: it cannot be read, is no text in UTF-8, has no header, or a row has more or
-            fewer cells than the header.
+        ConfigError: it cannot be read, is not UTF-8, has no header, or a row has more or fewer
+            cells than the header.
     """
     file = Path(path)
     try:

@@ -1,4 +1,4 @@
-"""The unit of a column or key is the end of its name, and nothing else says it."""
+"""Units of columns and keys, which are stated only by the endings of their names."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ UNITS = {
     "s_per_bit": "s/bit",
     "s_per_h": "s/h",
 }
-"""Endings of names, with the unit as it is printed."""
+"""Units as printed, by the ending of a name."""
 
 
 def ending_of(name: str) -> str:
-    """Return the longest ending that is a unit: `s` of `link.delay_s`, nothing of `pattern`."""
+    """Return the longest ending that is a unit: `s` for `link.delay_s`, "" for `pattern`."""
     words = name.rpartition(".")[2].split("_")[1:]
     endings = ("_".join(words[start:]) for start in range(len(words)))
     return next((ending for ending in endings if ending in UNITS), "")
 
 
 def unit_of(name: str) -> str:
-    """Return the unit a name ends in, as printed: `link.delay_s` gives `s`, `pattern` nothing."""
+    """Return the unit that a name ends in, as printed: `s` for `link.delay_s`."""
     return UNITS.get(ending_of(name), "")
 
 
-"""By the last part of a key, what one of a unit is in the key's own."""
+"""Factors from other units to the unit of a key, by the key's ending."""

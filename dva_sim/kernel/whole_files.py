@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whatever happens while they are written."""
+"""Atomic writing of files: complete or not at all, even if the process is killed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Give a path to write to, which takes the place of `path` if the block ends without an error.
+    """Yield a temporary path, which replaces `path` if the block ends without an error.
 
-    It has the same ending, by which some writers know the format.
+    It has the same ending, by which some writers choose the format.
     """
     _clear(path)
     part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
@@ -25,7 +25,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def _clear(path: Path) -> None:
-    """Remove what processes that were killed have left beside a file."""
+    """Remove the temporary files of killed processes beside a file."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}.*{glob.escape(path.suffix)}"):
         owner = part.name.removeprefix(f".{path.stem}.").removesuffix(path.suffix)
         if owner.isdecimal() and not _lives(int(owner)):
@@ -37,16 +37,16 @@ def _lives(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except OSError:  # it is somebody else's
+    except OSError:  # a process of another user
         return True
     return True
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
-    """Write bytes, or text in UTF-8 as it stands.
+    """Write bytes, or text as UTF-8 with unchanged line ends, atomically.
 
     Raises:
-        OSError: it cannot be written; what was there is as it was.
+        OSError: it cannot be written; an existing file is unchanged.
     """
     with whole(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)

@@ -10,14 +10,14 @@ from dva_sim.kernel.units import ending_of
 
 
 def without_unit(name: str) -> str:
-    """Return a key without its unit and with spaces for the signs between its words."""
+    """Return a key without its unit, with spaces between its words."""
     ending = ending_of(name)
     stem = name.removesuffix(f"_{ending}") if ending else name
     return stem.replace(".", " ").replace("_", " ")
 
 
 def number(value: float) -> str:
-    """Return three figures at most, and never more decimals than the size deserves."""
+    """Return a number with at most three significant figures."""
     if not math.isfinite(value):
         return "–"
     decimals = 0 if abs(value) >= 100 else 1 if abs(value) >= 1 else 2
@@ -26,7 +26,7 @@ def number(value: float) -> str:
 
 
 def as_number(text: str) -> float:
-    """Read what `number` has printed; nan for its dash."""
+    """Parse text by `number`; nan for its dash."""
     return float(text.replace("\N{MINUS SIGN}", "-").replace("–", "nan"))
 
 
@@ -36,17 +36,17 @@ def capital(text: str) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a number with its unit, apart by a space that does not break."""
+    """Return a number with its unit, separated by a no-break space."""
     return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)
 
 
 def signed(value: float, unit: str) -> str:
-    """Return a difference with its sign: `+4.5 s`; zero has none."""
+    """Return a difference with its sign, such as `+4.5 s`; zero has no sign."""
     return f"{'+' if value > 0 and number(value) != '0' else ''}{quantity(value, unit)}"
 
 
 def percent(share: float) -> str:
-    """Return a share as a whole percentage; small ones keep a decimal so that they are not zero."""
+    """Return a share as a whole percentage; small ones keep a decimal so as not to read zero."""
     if not math.isfinite(share):
         return "–"
     text = f"{100 * share:.0f}" if share == 0 or 0.01 <= share <= 0.99 else f"{100 * share:.1f}"
@@ -54,12 +54,9 @@ def percent(share: float) -> str:
 
 
 def first_and_rest(text: str) -> tuple[str, str]:
-    """Return the first sentence, and the rest, which begins with a capital letter.
-
-    Empty without one.
-    """
-    first, *rest = re.split(r"(?<=[.]) (?=[A-Z])", text, maxsplit=1)
-    return first, "".join(rest)
+    """Return the first sentence of a text, and the rest; an empty rest if there is none."""
+    first, *further = re.split(r"(?<=[.]) (?=[A-Z])", text, maxsplit=1)
+    return first, "".join(further)
 
 
 def listing(words: Sequence[str], last: str = "and") -> str:

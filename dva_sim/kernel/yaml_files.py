@@ -22,7 +22,7 @@ Place = tuple[int | None, int | None]
 
 
 class Slip(NamedTuple):
-    """Translation of a message of ruamel; and whether the mistake is where its context began."""
+    """Translation of a message of ruamel; and whether its context began at the mistake."""
 
     theirs: str
     ours: str
@@ -52,7 +52,7 @@ _WORDS: Final = (
     Slip(r"expected (?:'<document start>'|<document start>)", "text after the end of the document"),
     Slip(r"found unhashable key", "a key is text or a number, not a list or a mapping"),
 )  # fmt: skip
-_THEIRS: Final = r"(found|expected|could|but|did|while) "  # what is not of our own constructor
+_THEIRS: Final = r"(found|expected|could|but|did|while) "  # messages of ruamel's own
 _SIGNS: Final = {
     "'<stream end>'": "the end of the file",
     "<block end>": "the end of a block",
@@ -62,7 +62,7 @@ _SIGNS: Final = {
 
 
 def in_words(error: Any) -> tuple[str, Place]:
-    """Return the problem in words, and its line and column from 1.
+    """Return the problem in words, with its line and column, counted from 1.
 
     Args:
         error: Exception raised by ruamel, with its marks.
@@ -90,7 +90,7 @@ MAX_VALUES = 20_000  # maximum values in one file
 
 @dataclass(frozen=True)
 class Document:
-    """A parsed file: plain data, and the place of every key.
+    """A parsed file: plain data, with the line and column of every key.
 
     Attributes:
         data: Plain dictionaries, lists and scalars.
@@ -114,7 +114,7 @@ def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8.
 
     Raises:
-        ConfigError: unreadable, or a byte that such a text cannot have, with its place.
+        ConfigError: it cannot be read, or is not UTF-8.
     """
     try:
         data = path.read_bytes()
@@ -132,7 +132,7 @@ def load_yaml(path: str | Path) -> Document:
     """Read a mapping from a YAML file.
 
     Raises:
-        ConfigError: unreadable, not YAML, a key twice, or not a mapping.
+        ConfigError: it cannot be read, is not YAML or a mapping, or repeats a key.
     """
     path = Path(path)
     text = read_text(path)
@@ -160,7 +160,7 @@ def with_named_files(path: Path) -> list[Path]:
         return [path]
     try:
         data = load_yaml(path).data
-    except ConfigError:  # whatever it is, it is no document that names files
+    except ConfigError:  # not a document, so it names no files
         return [path]
     names = [file_in(text) for text in texts_in(data) if "." in text]
     files = (file for name in names for file in (path.parent / name, beside(path, name)))
@@ -168,17 +168,17 @@ def with_named_files(path: Path) -> list[Path]:
 
 
 def beside(path: Path, name: str) -> Path:
-    """Return the file in the folder of `path` that is called as the last part of a path `name`."""
+    """Return the file in the folder of `path` with the file name of another path, `name`."""
     return path.parent / PureWindowsPath(name).name
 
 
 def file_in(name: str) -> str:
-    """Return the file of a name, which may be that of a class in it: `file.py:Class`."""
+    """Return the file in a name, which may name a class in it: `file.py:Class`."""
     return name.rpartition(":")[0] if ".py:" in name else name
 
 
 def texts_in(data: object) -> Iterator[str]:
-    """Yield every text among plain data, keys apart."""
+    """Yield every text in plain data, except keys."""
     if isinstance(data, str):
         yield data
     elif isinstance(data, Mapping | list):
@@ -190,7 +190,7 @@ def texts_in(data: object) -> Iterator[str]:
 def _read(text: str) -> tuple[Any, Mapping[KeyPath, tuple[int, int]]]:
     """Return the plain data and its places.
 
-    Kept, as each cell of a study reads the same scenario.
+    Cached, as each cell of a study reads the same scenario.
     """
     places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     return _plain(_reader().load(text), (), places), places
@@ -206,7 +206,7 @@ _VALUES = frozenset(
 class _PlainKinds(RoundTripConstructor):
     """Constructor of text, numbers, truth values, lists and mappings only.
 
-    Else a tag such as `!!python/object` makes something that nobody expects further on.
+    Otherwise a tag such as `!!python/object` would create objects that later code does not expect.
     """
 
     def construct_object(self, node: Any, deep: bool = False) -> Any:
@@ -231,11 +231,11 @@ def _reader() -> YAML:
 
 
 class _TooMuchError(ValueError):
-    """A few aliases of aliases can stand for more values than any memory holds."""
+    """Excess of values: nested aliases can expand to more than memory can hold."""
 
 
 def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> Any:
-    """Return the plain data without ruamel's types; records the place of every key on the way."""
+    """Return the data without ruamel's types, and record the place of every key."""
     if len(places) > MAX_VALUES:
         raise _TooMuchError(f"has more than {MAX_VALUES} values, aliases counted")
     if isinstance(node, CommentedMap):

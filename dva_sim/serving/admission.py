@@ -48,12 +48,12 @@ class RequestFacts:
 class OwnNames:
     """Names under which a port is served, and the pages that may send it requests.
 
-        Attributes:
-    names: Host names, in lower case.
-            any_address: True if it is served on all addresses of the machine. Then any IP address is
-                accepted as host: unlike a name, an address cannot be rebound to another machine.
-            any_port: True if pages served by another port of the same names are admitted.
-    programs: Origins of web applications elsewhere that are admitted.
+    Attributes:
+        names: Host names, in lower case.
+        any_address: True if it is served on all addresses of the machine. Then any IP address is
+            accepted as host: unlike a name, an address cannot be rebound to another machine.
+        any_port: True if pages served by another port of the same names are admitted.
+        programs: Origins of web applications elsewhere that are admitted.
     """
 
     names: Collection[str] = LOCAL

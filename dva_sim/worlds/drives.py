@@ -169,8 +169,8 @@ class GuardedDrive(Guard, Drive):
         if got is None:
             return 0.0, 0.0
         most = self.spec.max_turn_rate
-        aims = self._held("aims at [m/s]", got[0], 0.0, self.spec.max_speed)
-        return aims, self._held("aims at [rad/s]", got[1], -most, most)
+        aims = self._clamp("aims at [m/s]", got[0], 0.0, self.spec.max_speed)
+        return aims, self._clamp("aims at [rad/s]", got[1], -most, most)
 
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
@@ -201,8 +201,8 @@ class GuardedDrive(Guard, Drive):
         brakes = min(now_speed, 0.0) <= speed <= max(now_speed, 0.0)
         spins = abs(turn_rate) > abs(now_turn_rate)
         most = spec.max_turn_rate
-        self._held("drives at [m/s]", 0.0 if brakes else speed, 0.0, spec.max_speed)
-        self._held("drives at [rad/s]", turn_rate if spins else 0.0, -most, most)
+        self._clamp("drives at [m/s]", 0.0 if brakes else speed, 0.0, spec.max_speed)
+        self._clamp("drives at [rad/s]", turn_rate if spins else 0.0, -most, most)
 
 
 def _within(value: float, least: float, most: float) -> float:

@@ -293,8 +293,8 @@ class GuardedMapping(Guard, Mapping):
     def command(self, level: float, turn: float, dt: float) -> Reading:
         # Limited, as a person who wants to stand may ask for less than zero.
         level, turn = self._answer(self._mapping.command, level, turn, dt) or NEUTRAL
-        level = self._held("asks for level", max(level, 0.0), 0.0, LEVELS)
-        return level, self._held("asks for [deg/s]", turn, -MAX_TURN_DEG, MAX_TURN_DEG)
+        level = self._clamp("asks for level", max(level, 0.0), 0.0, LEVELS)
+        return level, self._clamp("asks for [deg/s]", turn, -MAX_TURN_DEG, MAX_TURN_DEG)
 
     @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:

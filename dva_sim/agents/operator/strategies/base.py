@@ -130,8 +130,8 @@ class GuardedStrategy(Guard, Strategy):
         """Limit the command to the robot's range; an invalid answer stops it."""
         speed, turn = self._answer(self.strategy.drive, route, view, stop_before) or (0.0, 0.0)
         most = self.reach.turn_rate
-        speed = self._held("wants [m/s]", speed, 0.0, self.reach.speed)
-        return Intent(speed, self._held("wants [rad/s]", turn, -most, most))
+        speed = self._clamp("wants [m/s]", speed, 0.0, self.reach.speed)
+        return Intent(speed, self._clamp("wants [rad/s]", turn, -most, most))
 
     def point(self, view: PointView) -> Velocity:
         """Return the velocity to a point, no faster than the cursor can."""
