@@ -1,5 +1,6 @@
-"""Real time: DVA, world and operators of a scenario as processes that talk by sockets.
+"""Real time: DVA, world and operators of a scenario as processes that communicate by sockets.
 
-It may import the full model, the network's sockets and what lies below them, but no experiments.
+The package may import the full model, the network's sockets and packages below them, but not
+`experiments`.
 Begin reading at `supervisor`, which starts the processes, then at `process` and `parts`.
 """

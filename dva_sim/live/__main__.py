@@ -15,12 +15,14 @@ from dva_sim.serving.pipes import PipeEnd
 
 
 def main(argument: str) -> int:
-    """Run the part that the supervisor asks for; its exit code."""
+    """Run the part that the supervisor requests; return the exit code."""
     arguments = json.loads(argument)
     options = arguments["options"]
     for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
-    reports = PipeEnd(sys.stdout.fileno())  # a supervisor that does not read must not stop robots
+    reports = PipeEnd(
+        sys.stdout.fileno()
+    )  # never blocks: a stalled supervisor must not stop robots
     try:
         run_part(
             arguments["part"],

@@ -1,4 +1,4 @@
-"""The port of a DVA in this process, which can be closed and opened while the DVA goes on."""
+"""The port of a DVA in this process, which can be closed and reopened while the DVA runs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from dva_sim.simulation.full.stage import DVA
 class DvaPort:
     """Port of a DVA.
 
-    In a modelled network no port of this computer opens: the DVA takes part in it, or does not.
+    In a modelled network no real port is opened: the DVA joins or leaves the network.
 
     Args:
-        agent: Function that returns the DVA: another one takes its place after a crash.
-        network: Network that it takes part in.
-        address: Its address, real or displayed.
+        agent: Function that returns the DVA, which is replaced after a crash.
+        network: Network of the DVA.
+        address: Address of the DVA; in a modelled network it is only displayed.
 
     Attributes:
         address: Current or future address.
@@ -39,14 +39,14 @@ class DvaPort:
 
     @property
     def number(self) -> int:
-        """Port of its requests."""
+        """Port number for requests."""
         return split_address(self.address)[1]
 
     def close(self) -> None:
-        """Take no more requests and say nothing; the devices find out by their time-outs.
+        """Take no more requests and send nothing; devices notice by their time-outs.
 
         Raises:
-            NetworkError: it does not listen.
+            NetworkError: the port is closed already.
         """
         if not self.listens:
             raise NetworkError("The server is already stopped.")
@@ -59,7 +59,7 @@ class DvaPort:
         """Take requests on a port.
 
         Raises:
-            NetworkError: it listens already, or the port cannot be had.
+            NetworkError: a port is open already, or this one is not available.
         """
         if self.listens:
             raise NetworkError(f"The server is already listening on {self.address}.")

@@ -1,7 +1,7 @@
-"""A server for Foxglove: what a recording would hold, while the run goes on.
+"""A server for Foxglove that shows the channels of a recording during the run.
 
-It has a thread with an event loop of its own, and takes nothing from its viewers but their
-subscriptions. It listens on this machine alone.
+It has a thread with its own event loop, and accepts only subscriptions from its viewers. It listens
+only on this machine.
 """
 
 from __future__ import annotations
@@ -34,19 +34,22 @@ from dva_sim.serving.web_sockets import WireProtocol, heard, say
 from dva_sim.simulation.scenario import Scenario
 
 LAYOUT: Final = Path(channels.__file__).with_name("foxglove_layout.json")  # panels of a run
-PROGRAMS: Final = "https://app.foxglove.dev", "file://"  # Foxglove in a browser, and its program
-MAX_REQUEST: Final = 100_000  # design: of a viewer [B]
+PROGRAMS: Final = (
+    "https://app.foxglove.dev",
+    "file://",
+)  # Foxglove in a browser, and as an application
+MAX_REQUEST: Final = 100_000  # design: maximum size of a viewer's request [B]
 MAX_CONNECTIONS = 64
 MAX_VIEWERS = 16
-PING: Final = 2.0  # design: between two pings [s]
-PONG_WITHIN: Final = 3.0  # design: then a viewer is cut [s]
-ENDS_WITHIN: Final = 5.0  # design: [s]
-LOOK: Final = 0.5  # between two looks at which cameras are watched [s]
-STREAM_WITHIN: Final = 5.0  # for a picture to come [s]
-LARGEST: Final = 2_000_000  # of a picture [B]
+PING: Final = 2.0  # design: interval between two pings [s]
+PONG_WITHIN: Final = 3.0  # design: time for a reply before a viewer is cut [s]
+ENDS_WITHIN: Final = 5.0  # design: time for the server's thread to end [s]
+LOOK: Final = 0.5  # interval of checks which cameras are watched [s]
+STREAM_WITHIN: Final = 5.0  # maximum wait for a picture [s]
+LARGEST: Final = 2_000_000  # maximum size of a picture [B]
 
 
-Shown = tuple[ViewedChannel, int, bytes]  # with its time [ns]
+Shown = tuple[ViewedChannel, int, bytes]  # channel, time [ns] and content of a message
 
 
 class FoxgloveServer:
@@ -58,9 +61,9 @@ class FoxgloveServer:
         port: Port to serve.
 
     Attributes:
-        camera_base: URL below which the robots' pictures are; empty: nowhere.
-        camera_token: Shown there; empty: none.
-        failures: Lines that could not be shown.
+        camera_base: URL of the server of the robots' pictures; empty: none.
+        camera_token: Token for that server; empty: none.
+        failures: Number of lines that could not be shown.
     """
 
     def __init__(self, scenario: Scenario, seed: int, port: OpenPort) -> None:
@@ -85,7 +88,7 @@ class FoxgloveServer:
 
     @property
     def where(self) -> str:
-        """Return a line that says where it is, and where a layout for it."""
+        """Return a line with the server's address and the path of a layout."""
         return f"Foxglove: {self._port.url} (layout: {LAYOUT})"
 
     # --- viewers, in the thread of the event loop --------------------------------------------
@@ -147,17 +150,17 @@ class FoxgloveServer:
     # --- the run, in any thread --------------------------------------------------------------
 
     def _tell_scene(self) -> None:
-        """Say again what stands on the site, for a viewer that comes late."""
+        """Repeat the static scene, for a viewer that connects late."""
         with self._lock:
             self._log(self._running.standing())
 
     def keep(self, lines: bytes) -> None:
-        """Take whole lines of the run's parts; any thread may."""
+        """Show whole lines of the run's parts; may be called by any thread."""
         with self._lock:
             before = self._running.now
             messages = []
             for line in lines.splitlines():
-                # These lines are judged by the safety rules as well, by the thread that calls.
+                # The calling thread also judges these lines, so no error may escape.
                 try:
                     messages += self._take(json.loads(line))
                 except (ValueError, LookupError, TypeError):
@@ -185,7 +188,7 @@ class FoxgloveServer:
             self._loop.call_soon_threadsafe(self._show, new, entries, time)
 
     def _channel(self, topic: str, schema: str) -> ViewedChannel:
-        """Return a channel, which is advertised with its first message."""
+        """Return a channel; a new one is advertised with its first message."""
         channel = self._channels.get(topic)
         if channel is None:
             encoding = XML if schema == XML else "json"
@@ -196,12 +199,12 @@ class FoxgloveServer:
     # --- pictures ------------------------------------------------------------------------
 
     def _look_at_cameras(self) -> None:
-        """Read the pictures of the robots whose channel somebody has subscribed to."""
+        """Start reading the pictures of each robot whose channel has a subscriber."""
         while not self._is_over.wait(LOOK):
             with self._lock:
                 robots = self._running.robots if self.camera_base else []
                 images = [(name, self._image(name)) for name in robots]
-                self._log([])  # viewers have to hear of them
+                self._log([])  # advertises the new channels
             for name, channel in images:
                 reader = self._read_by.get(name)
                 if channel.viewers and (reader is None or not reader.is_alive()):
@@ -213,7 +216,7 @@ class FoxgloveServer:
         return self._channel(f"/{name}/{channels.IMAGE}", "foxglove.CompressedImage")
 
     def _read(self, name: str) -> None:
-        """Pass on the pictures of a robot as long as somebody looks."""
+        """Pass on the pictures of a robot while its channel has a subscriber."""
         query = f"?token={self.camera_token}" if self.camera_token else ""
         url = f"{self.camera_base}camera/{name}.mjpg{query}"
         with suppress(OSError, ValueError), urllib.request.urlopen(url, timeout=STREAM_WITHIN) as s:
@@ -224,7 +227,7 @@ class FoxgloveServer:
                     self._log([picture])
 
     def close(self) -> None:
-        """Serve no longer."""
+        """End the server."""
         with self._lock:
             self._is_over.set()
             self._loop.call_soon_threadsafe(self._ended.set)
@@ -232,10 +235,10 @@ class FoxgloveServer:
 
 
 def _head(stream: Any) -> tuple[int, float]:
-    """Read the headers of a part: bytes of the picture, and when it was captured [s].
+    """Read the headers of a part; return the size of the picture [B] and its capture time [s].
 
     Raises:
-        ValueError: there is none, or it is too large.
+        ValueError: the picture is missing or too large.
     """
     length = 0
     captured = 0.0

@@ -16,10 +16,15 @@ from typing import Any, Final
 
 from dva_sim.recordings.writing import schema_of_channel
 
-PROTOCOLS: Final = "foxglove.sdk.v1", "foxglove.websocket.v1"  # they differ in nothing used here
-MAX_WAITING: Final = 8_000_000  # design: of a viewer; then its oldest messages are dropped [B]
-MESSAGE = 1  # kind of binary messages
-TIME = 2  # kind of binary messages
+PROTOCOLS: Final = (
+    "foxglove.sdk.v1",
+    "foxglove.websocket.v1",
+)  # they differ only in parts not used here
+MAX_WAITING: Final = (
+    8_000_000  # design: maximum data waiting for a viewer; beyond, the oldest is dropped [B]
+)
+MESSAGE = 1  # kind of binary message: data of a channel
+TIME = 2  # kind of binary message: time of the run
 SERVER_INFO: Final = {"op": "serverInfo", "name": "dva-sim", "capabilities": ["time"]}
 
 
@@ -28,8 +33,8 @@ class ViewedChannel:
     """A channel that viewers may subscribe to.
 
     Attributes:
-        number: Its id.
-        topic: Its topic.
+        number: Id of the channel.
+        topic: Topic of the channel.
         schema: Name of its schema.
         encoding: Encoding of its messages.
         viewers: Number of viewers that have subscribed.
@@ -42,7 +47,7 @@ class ViewedChannel:
     viewers: int = 0
 
     def advertised(self) -> dict[str, Any]:
-        """Return the channel as viewers hear of it."""
+        """Return the advertisement of the channel."""
         name, encoding, text = schema_of_channel(self.schema)
         return {
             "id": self.number,
@@ -55,7 +60,7 @@ class ViewedChannel:
 
 
 class FoxgloveViewer:
-    """Viewer that the thread of the event loop serves.
+    """A viewer, used only in the thread of the event loop.
 
     Args:
         session: Id of the run.
@@ -103,14 +108,14 @@ class FoxgloveViewer:
         return data
 
     def take(self, text: str | bytes, channels: dict[int, ViewedChannel]) -> set[str]:
-        """Take a request of the viewer.
+        """Handle a request of the viewer.
 
         Args:
-            text: The request; one that makes no sense is left out.
+            text: The request; an invalid one is ignored.
             channels: All channels, by their numbers.
 
         Returns:
-            Topics that the viewer has subscribed to now.
+            Topics newly subscribed to by this request.
         """
         try:
             request = json.loads(text)

@@ -1,10 +1,10 @@
-"""Judges a live run by the safety rules while it goes on, from the lines that its parts write.
+"""Judges a live run by the safety rules during the run, from the lines that its parts write.
 
-Parts are processes. Each writes the facts that it sees itself, in their order and by its own clock.
-A rule compares times of one part only, so that no rule depends on two clocks: commands, motors and
+Parts are processes. Each writes the facts that it observes, in order and by its own clock. A rule
+compares only times of the same part, so that no rule depends on two clocks: commands, motors and
 motion of a robot are facts of the world's process, events and permissions those of the DVA's. Two
-facts come from another part: the true sender of a message, whatever its time, and the place of
-somebody who confirms an event, to half a second.
+facts come from another part: the true sender of a message, regardless of time, and the position of
+a person or robot that confirms an event, accurate to half a second.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from dva_sim.simulation.full.observation_json import of_plain
 from dva_sim.simulation.full.observations import MAX_SENT, Arrived, FactGap, SafetyTerms, Senders
 from dva_sim.simulation.full.verdicts import Judge, Verdict
 
-WAITS = 10.0  # for the lines of a part that is silent or behind [s]
-# First words of the lines that count.
+WAITS = 10.0  # maximum wait for the lines of a silent or late part [s]
+# First words of the lines that are judged.
 OWN_SIDE = "here"
 SEEN = "seen"
 SENT_LINE = "sent"
@@ -35,31 +35,31 @@ Line = list[Any]
 
 
 class Facts:
-    """Reads facts from the lines of parts, and finds the true sender of each message.
+    """Reads facts from lines, and identifies the true sender of each message.
 
     Args:
-        most: So many messages are remembered; None: all.
+        most: Maximum number of messages that are remembered; None: all.
     """
 
     def __init__(self, most: int | None = MAX_SENT) -> None:
-        self._here: set[str] = set()
-        self._senders = Senders(self._here.__contains__, most)
+        self._own_devices: set[str] = set()
+        self._senders = Senders(self._own_devices.__contains__, most)
 
     def note(self, line: Line) -> None:
-        """Remember the devices of this run and the messages they have sent, in any order."""
+        """Remember the devices of this run and the messages that they sent, in any order."""
         if line[0] == OWN_SIDE:
-            self._here.update(line[2])
-        elif line[0] == SENT_LINE and line[2] in self._here:
+            self._own_devices.update(line[2])
+        elif line[0] == SENT_LINE and line[2] in self._own_devices:
             self._senders.note(line[2], line[4].encode())
 
     def fact(self, line: Line) -> Any:
-        """Return the fact in a line; None if it holds none."""
+        """Return the fact in a line; None if it contains none."""
         if line[0] == SENT_LINE:
             _, time, source, to, text = line
             return Sent(time, source, to, len(text), text.encode())
         if line[0] == FRAME:
             _, time, robot, seen, captured = line
-            return Sent(time, robot, "", 0, CameraFrame(observation_of(seen), captured))
+            return Sent(time, robot, "", 0, CameraFrame(read_observation(seen), captured))
         if line[0] != SEEN:
             return None
         _, time, word, values = line
@@ -69,24 +69,26 @@ class Facts:
         return fact
 
 
-def observation_of(seen: list[Any]) -> Observation:
+def read_observation(seen: list[Any]) -> Observation:
     """Return a camera's observation from its values in a line."""
     *values, hazards, visibility = seen
-    return Observation._make((*values, tuple(SeenHazard(*one) for one in hazards), visibility))
+    return Observation._make(
+        (*values, tuple(SeenHazard(*hazard) for hazard in hazards), visibility)
+    )
 
 
 class LiveJudge:
-    """Judges the lines of all parts in order of time; each part has a thread of its own.
+    """Judges the lines of all parts in order of time; each part calls from its own thread.
 
     Args:
-        terms: Limits that the run is held to.
+        terms: Limits of the safety rules.
     """
 
     def __init__(self, terms: SafetyTerms) -> None:
         self._judge = Judge(terms)
         self._facts = Facts()
         self._waiting: list[tuple[float, int, Line]] = []
-        self._heard: dict[int, float] = {}  # latest time reported by each running part [s]
+        self._reported_to: dict[int, float] = {}  # latest time reported by each running part [s]
         self._count = 0
         self._latest = 0.0
         self._up_to = 0.0
@@ -96,20 +98,20 @@ class LiveJudge:
     def joins(self, part: int) -> None:
         """Expect lines from a part."""
         with self._lock:
-            self._heard[part] = 0.0
+            self._reported_to[part] = 0.0
 
     def hear(self, part: int, lines: Iterable[bytes]) -> None:
-        """Take whole lines of a part."""
+        """Handle whole lines of a part."""
         with self._lock:
             for line in lines:
                 if line.startswith(_STARTS):
                     self._hear(part, json.loads(line))
-            self._judge_up_to(max(min(self._heard.values()), self._latest - WAITS))
+            self._judge_up_to(max(min(self._reported_to.values()), self._latest - WAITS))
 
     def _hear(self, part: int, line: Line) -> None:
         time = float(line[1])
         self._facts.note(line)
-        self._heard[part] = max(self._heard[part], time)
+        self._reported_to[part] = max(self._reported_to[part], time)
         self._latest = max(self._latest, time)
         self._count += 1
         heapq.heappush(self._waiting, (time, self._count, line))
@@ -117,8 +119,8 @@ class LiveJudge:
     def leaves(self, part: int) -> None:
         """Expect no more lines from a part."""
         with self._lock:
-            self._heard.pop(part, None)
-            self._judge_up_to(min(self._heard.values(), default=self._latest))
+            self._reported_to.pop(part, None)
+            self._judge_up_to(min(self._reported_to.values(), default=self._latest))
 
     def _judge_up_to(self, time: float) -> None:
         self._is_judging = True
@@ -130,7 +132,7 @@ class LiveJudge:
         self._is_judging = False
 
     def news(self) -> list[Moment]:
-        """Return what was found since the last call, for the timeline; of each rule the first."""
+        """Return new breaches for the timeline; only the first one of each rule."""
         with self._lock:
             moments = self._judge.recorder.timeline
             self._judge.recorder.timeline = []
@@ -139,7 +141,7 @@ class LiveJudge:
     def verdicts(self) -> list[Verdict]:
         """Return the verdict on each rule, once all parts have ended.
 
-        After an error of the judge itself, nothing that came later has been judged.
+        After an error of the judge itself, later lines are not judged.
         """
         with self._lock:
             if not self._is_judging:

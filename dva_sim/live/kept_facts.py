@@ -1,4 +1,4 @@
-"""Facts of a run for its recording: the team, the events, and where everybody is."""
+"""Facts of a run for its recording: team, events and positions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD, Run
 
 
 def keep_events(recorder: LiveRecorder, events: EventTable) -> None:
-    """Record how the events stand: the last that were closed, and all that are open."""
+    """Record the states of all open events and of the last closed ones."""
     for e in (*events.closed.values(), *events.open.values()):
         at = [e.position.latitude, e.position.longitude]
         sent = {role: getattr(e, role) for role in SENT}
@@ -22,7 +22,7 @@ def keep_events(recorder: LiveRecorder, events: EventTable) -> None:
 
 
 def keep_team(recorder: LiveRecorder, labels: dict[str, str], field: Field) -> None:
-    """Record the team, and which hazards are dealt with."""
+    """Record the team and the contained hazards."""
     radii = {name: robot.body.spec.radius for name, robot in field.robots.items()}
     recorder.put_new("team", dict(labels), radii, key="team")
     for number, when in field.contained.items():
@@ -30,7 +30,7 @@ def keep_team(recorder: LiveRecorder, labels: dict[str, str], field: Field) -> N
 
 
 def keep_places(recorder: LiveRecorder, field: Field, now: float) -> None:
-    """Record where everybody is."""
+    """Record all positions."""
     recorder.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
 
 
@@ -38,7 +38,7 @@ def keep_run(run: Run, recorder: LiveRecorder) -> Callable[[], None]:
     """Record all facts of a run in this process, from now on.
 
     Returns:
-        Function that records what has changed since the last second, for the end of the run.
+        Function that records the changes since the last second, for the end of the run.
     """
     field = run.field
     clock = run.clock

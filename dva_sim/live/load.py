@@ -1,4 +1,4 @@
-"""Load on a DVA: processes with devices, what they found, and where the DVA breaks."""
+"""Load test of a DVA: processes with devices, their figures, and the load that breaks the DVA."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from dva_sim.options.runs import LiveOptions, LoadOptions
 from dva_sim.serving.processes import Child, end_all
 from dva_sim.simulation.full.stage import DVA, id_of
 
-SCENARIO: Final = "drive-to-event"  # whose site the DVA that is started knows
-SETTLE: Final = 3.0  # design: for all to join, and more for many [s]
-JOINS_PER_S: Final = 50.0  # design: devices that join in a second
-MAX_LATE_S: Final = 1.0  # design: the 99th percentile of the DVA's replies that counts as late
+SCENARIO: Final = "drive-to-event"  # scenario of a DVA that is started here
+SETTLE: Final = 3.0  # design: minimum time for all devices to join [s]
+JOINS_PER_S: Final = 50.0  # design: rate at which devices join [1/s]
+MAX_LATE_S: Final = 1.0  # design: 99th percentile of reply times beyond which the DVA is late [s]
 MAX_LOST: Final = 0.01  # design: share of requests lost or refused that counts as broken
 OF_DVA: Final = ("report", "list", "session")  # requests to the DVA; others go to robots
 PERCENTILES: Final = (50.0, 99.0, 99.9)
@@ -46,16 +46,16 @@ class LoadFigures:
         devices: Number of devices.
         sessions: Number of sessions.
         joined: Number of devices registered at the end.
-        messages_per_s: Publications and answered requests in a second.
-        requests_p50_s: Median time of the DVA's replies [s]; likewise the others.
+        messages_per_s: Rate of publications and answered requests [1/s].
+        requests_p50_s: Median time to a reply of the DVA [s]; other percentiles likewise.
         orders_p50_s: Median time from the report of an event to the first order [s].
         refused: Number of requests refused.
         lost: Number of requests without a reply.
-        memory_mb: Memory of the DVA [MB]; nan if it is not here.
-        files: Open files of the DVA; nan if it is not here.
-        processor: Share of one core that the DVA used; nan if it is not here.
-        late_s: Longest time that the processes of the load were late themselves [s].
-        broke: Reason why the DVA counts as broken, or nothing is known of it; empty while it holds.
+        memory_mb: Memory of the DVA [MB]; nan if it runs on another machine.
+        files: Open files of the DVA; nan if it runs on another machine.
+        processor: Share of a core that the DVA used; nan if it runs on another machine.
+        late_s: Longest delay of the load's own processes [s].
+        broke: Reason why the DVA counts as broken or its state is unknown; empty otherwise.
     """
 
     devices: int
@@ -84,7 +84,7 @@ class LoadFigures:
 
 
 def percentiles(name: str, times: Iterable[float]) -> dict[str, float]:
-    """Return the percentiles of some times [s] by column; nan without any."""
+    """Return the percentiles of times [s] by column; nan without times."""
     values = np.percentile(list(times) or [math.nan], PERCENTILES)
     return {
         f"{name}_p{word}_s": float(value)
@@ -95,14 +95,14 @@ def percentiles(name: str, times: Iterable[float]) -> dict[str, float]:
 def order_times(
     reported: Iterable[tuple[str, float]], ordered: Iterable[tuple[str, float]]
 ) -> list[float]:
-    """Return the times from reports to the first order to their places after them [s]."""
+    """Return the time from each report to the next order for the same place [s]."""
     orders: Times = defaultdict(list)
     for place, time in sorted(ordered, key=lambda pair: pair[1]):
         orders[place].append(time)
     waits = []
     for place, time in sorted(reported, key=lambda pair: pair[1]):
         at = bisect_left(orders[place], time)
-        if at < len(orders[place]):  # else it became part of an event that had an order
+        if at < len(orders[place]):  # otherwise it was merged into an event with an order
             waits.append(orders[place].pop(at) - time)
     return waits
 
@@ -113,7 +113,7 @@ def figures_of(
     """Sum up the counts of the processes of one step.
 
     Args:
-        options: Load that was asked for.
+        options: Requested load.
         devices: Number of devices in this step.
         every: Counts of each process, as `LoadCounts`.
         dva: Memory, files and processor of the DVA.
@@ -160,18 +160,18 @@ def figures_of(
 
 
 class LoadedDva:
-    """A DVA as the system sees its process.
+    """Resources that a DVA uses, as reported by the operating system.
 
     Args:
-        pid: Its process; None: it is elsewhere.
+        pid: Process of the DVA; None if it runs on another machine.
     """
 
     def __init__(self, pid: int | None) -> None:
-        self._here = None if pid is None else Path(f"/proc/{pid}")
+        self._process_folder = None if pid is None else Path(f"/proc/{pid}")
 
     @property
     def used_s(self) -> float:
-        """Processor time that it has used [s]; nan if it is elsewhere, or has ended."""
+        """Processor time used so far [s]; nan if it runs on another machine or has ended."""
         try:
             stat = self._read("stat").rpartition(")")[2].split()
         except OSError:
@@ -179,10 +179,10 @@ class LoadedDva:
         return (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
 
     def look(self, used_s: float, over_s: float) -> dict[str, float]:
-        """Return memory, files and the share of a core since it had used so much."""
+        """Return memory, open files and the share of a core used since an earlier time."""
         try:
             pages = int(self._read("statm").split()[1])
-            files = len(list((self._here or Path()).joinpath("fd").iterdir()))
+            files = len(list((self._process_folder or Path()).joinpath("fd").iterdir()))
         except OSError:
             return dict.fromkeys(("memory_mb", "files", "processor"), math.nan)
         memory = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -193,9 +193,9 @@ class LoadedDva:
         }
 
     def _read(self, name: str) -> str:
-        if self._here is None:
+        if self._process_folder is None:
             raise FileNotFoundError
-        return (self._here / name).read_text()
+        return (self._process_folder / name).read_text()
 
 
 def run_load(options: LoadOptions, make_shares: MakeShares | None = None) -> Iterator[LoadFigures]:
@@ -203,8 +203,8 @@ def run_load(options: LoadOptions, make_shares: MakeShares | None = None) -> Ite
 
     Args:
         options: The load.
-        make_shares: Function that makes the shares of a step at once, and returns the counts of
-            each; default: in processes of this machine.
+        make_shares: Function that runs all shares of a step and returns the counts of each; by
+            default in processes of this machine.
 
     Raises:
         ConfigError: the address is none, or there are more sessions than devices.
@@ -212,7 +212,7 @@ def run_load(options: LoadOptions, make_shares: MakeShares | None = None) -> Ite
     """
     check(options)
     devices = options.devices
-    _make_keys(options, devices)  # before the DVA reads them
+    _make_keys(options, devices)  # the DVA reads the keys when it starts
     with _dva(options) as (address, dva):
         while True:
             figures = _step(options, devices, address, dva, make_shares or make_here)
@@ -224,7 +224,7 @@ def run_load(options: LoadOptions, make_shares: MakeShares | None = None) -> Ite
 
 
 def check(options: LoadOptions) -> None:
-    """Refuse a load that cannot be made.
+    """Reject options of an impossible load.
 
     Raises:
         ConfigError: the address is none, or there are more sessions than devices.
@@ -243,7 +243,7 @@ def check(options: LoadOptions) -> None:
 
 @contextmanager
 def _dva(options: LoadOptions) -> Iterator[tuple[str, LoadedDva]]:
-    """Yield the DVA that was named, or one that is started and ended."""
+    """Yield the given DVA, or start one and end it afterwards."""
     if options.dva is not None:
         yield options.dva, LoadedDva(options.pid)
         return
@@ -272,7 +272,7 @@ def _listens(address: str) -> bool | None:
 
 
 def _make_keys(options: LoadOptions, devices: int) -> None:
-    """Make the missing keys of the devices, and of the DVA if it is started here."""
+    """Create missing keys of the devices, and of the DVA if it is started here."""
     if options.keys is not None:
         shares = _shares(options, devices, "")
         crew = [(kind, ns) for share in shares for kind, ns in share.numbers().items()]
@@ -315,23 +315,23 @@ def _step(
 
 
 def make_here(shares: list[LoadShare]) -> list[dict[str, Any]]:
-    """Make the shares in processes of this machine; return the counts of each."""
+    """Run the shares in processes of this machine; return the counts of each."""
     children = []
     pipe = subprocess.PIPE
     for share in shares:
         words = [sys.executable, "-m", "dva_sim.live.load_devices", json.dumps(asdict(share))]
         children.append(Child(f"load process {share.number}", words, stdin=pipe, stdout=pipe))
     try:
-        return [json.loads(said(child)) for child in children]
+        return [json.loads(read_output(child)) for child in children]
     finally:
         end_all(children)
 
 
-def said(child: Child) -> bytes:
-    """Return what a process has said once it ends.
+def read_output(child: Child) -> bytes:
+    """Return the output of a process once it has ended.
 
     Raises:
-        DvaSimError: nothing.
+        DvaSimError: the output is empty.
     """
     assert child.stdout is not None
     with child.stdout as pipe:
@@ -342,6 +342,6 @@ def said(child: Child) -> bytes:
     return text
 
 
-def _part(whole: int, count: int) -> list[int]:
-    """Share a number among processes."""
-    return [whole // count + (number < whole % count) for number in range(count)]
+def _part(total: int, count: int) -> list[int]:
+    """Divide a number among processes, as evenly as possible."""
+    return [total // count + (number < total % count) for number in range(count)]

@@ -1,7 +1,7 @@
 """Devices that put load on a DVA, in a process of their own: `python -m ... JSON`.
 
-They are devices like any other: they register, beat, publish, report and obey by the client that
-robots and guards use. Robots and guards here have no body: they answer what they are sent.
+They register, send heartbeats, publish, report and obey by the same client as simulated robots and
+guards, but have no body: they only answer messages.
 """
 
 from __future__ import annotations
@@ -30,12 +30,14 @@ from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.simulation.full.stage import DVA, TYPES, id_of, label_of
 from dva_sim.worlds.site import DEFAULT_FRAME
 
-GUARDS: Final = 0.2  # design: share of the devices that are not in a session
-TIMEOUT: Final = 2.0  # design: a request without a reply for so long is lost [s]
-PLACES: Final = tuple((2.0 + 4.0 * n, 12.0) for n in range(10))  # design: in a corridor [m]
-FIRST: Final = 1001  # design: number of the first of each kind; scenarios have those below
-PROCESS_STRIDE: Final = 4096  # design: numbers of devices between two processes
-LONGEST: Final = 36_000.0  # design: an orphan ends by then [s]
+GUARDS: Final = 0.2  # design: share of guards among the devices
+TIMEOUT: Final = 2.0  # design: time without a reply after which a request is lost [s]
+PLACES: Final = tuple(
+    (2.0 + 4.0 * n, 12.0) for n in range(10)
+)  # design: places of events, in a corridor [m]
+FIRST: Final = 1001  # design: number of the first device; scenarios use lower ones
+PROCESS_STRIDE: Final = 4096  # design: distance between the device numbers of two processes
+LONGEST: Final = 36_000.0  # design: maximum run time, in case the parent is killed [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,15 +48,15 @@ class LoadShare:
         dva: Address of the DVA.
         host: Address that the devices listen on; empty: one that the DVA can reach.
         number: Number of the process, from 0.
-        devices: Number of devices, those in sessions and the detector that reports included.
-        sessions: Number of operators who drive a robot each.
-        status_hz: Status messages that each device publishes in a second.
-        command_hz: Commands that each operator sends in a second.
-        reports_hz: Events that the process reports in a second.
-        churn_hz: Devices that vanish in a second, and come again with a new life.
-        duration: Time over which it measures [s].
-        settle: Time for all to join before that [s].
-        seed: Seed of positions and of who vanishes.
+        devices: Number of devices, including those in sessions and the detector that reports.
+        sessions: Number of operators, each of whom drives a robot.
+        status_hz: Rate of status messages of each device [1/s].
+        command_hz: Rate of commands of each operator [1/s].
+        reports_hz: Rate of events that the process reports [1/s].
+        churn_hz: Rate of devices that restart [1/s].
+        duration: Duration of the measurement [s].
+        settle: Time for all devices to join before the measurement [s].
+        seed: Random seed for positions and the choice of devices that restart.
         keys: Folder of their keys; None: not encrypted.
     """
 
@@ -93,11 +95,11 @@ class LoadCounts:
         trips: Time from each request to its reply [s], by kind of request.
         refused: Refusals by kind and code.
         lost: Requests without a reply, by kind.
-        published: Messages that were published.
-        reported: Place of each event that was reported, and when, by the machine's clock [s].
-        ordered: Place of each event that somebody was sent to, and when, by the same.
+        published: Number of published messages.
+        reported: Place and time of each reported event, by the machine's clock [s].
+        ordered: Place and time of each order, by the same clock [s].
         joined: Number of devices that are registered at the end.
-        late: Longest time that something waited for this process [s].
+        late: Longest delay of an action by this process [s].
     """
 
     trips: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -111,7 +113,7 @@ class LoadCounts:
 
 
 def place_of(position: m.Position) -> str:
-    """Return the name of an event's place, as both its report and its order have it."""
+    """Return a key for a position that is equal in an event's report and order."""
     return f"{position.latitude:.5f},{position.longitude:.5f}"
 
 
@@ -119,7 +121,7 @@ class LoadDevices:
     """The devices of one process.
 
     Args:
-        network: Their sockets.
+        network: Sockets of the devices.
         share: Share of the load that they make.
     """
 
@@ -142,7 +144,7 @@ class LoadDevices:
         self._operators = everybody["operator"]
 
     def begin(self) -> None:
-        """Let all join, evenly over the first half of the time to settle, and do their work."""
+        """Let all devices join, spread over the first half of the settling time, and work."""
         clock = self._network.clock
         share = self._share
         everybody = [self._detector, *self._robots, *self._guards, *self._operators]
@@ -209,14 +211,14 @@ class LoadDevices:
         then: Callable[[m.Reply], object] = lambda _: None,
         session: int = 0,
     ) -> None:
-        """Send a request, and count how it fares."""
+        """Send a request, and count its outcome."""
         clock = self._network.clock
-        sent = clock.now
+        sent_at = clock.now
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
                 self.counts.refused[f"{kind}: {m.CODE_NAMES[reply.code]}"] += 1
-            self.counts.trips[kind].append(clock.now - sent)
+            self.counts.trips[kind].append(clock.now - sent_at)
             then(reply)
 
         device.ask(peer, body, answered, lambda: self.counts.lost.update([kind]), session)
@@ -248,7 +250,7 @@ class LoadDevices:
         self._timed("report", self._detector, DVA, report)
 
     def _churn(self) -> None:
-        """Let one device vanish; the one that vanished before comes again."""
+        """Let one device vanish, and restart the one that vanished before."""
         idle = self._robots[self._share.sessions :]
         if self._vanished:
             device = self._vanished.popleft()
@@ -260,7 +262,7 @@ class LoadDevices:
             device.crash()
 
     def _obey(self, device: AgentDevice, message: m.Message) -> m.Reply:
-        """Answer a request; an order to look is followed by what was found: nothing."""
+        """Answer a request; report an empty finding for an order to look."""
         match message.body:
             case m.Order() as order:
                 self.counts.ordered.append((place_of(order.position), time.monotonic()))
@@ -274,11 +276,12 @@ class LoadDevices:
 
 
 def make(share: LoadShare, supervised: bool = False) -> dict[str, Any]:
-    """Make one share of a load until its time is up; return its counts, as `LoadCounts`.
+    """Run one share of a load for its duration; return its counts, as `LoadCounts`.
 
     Args:
-        share: The share; without a host, its devices listen where the DVA can reach this machine.
-        supervised: True to end when standard input does.
+        share: The share; without a host, its devices listen where the DVA can reach this
+            machine.
+        supervised: True to end at the end of standard input.
 
     Raises:
         DvaSimError: there are too few open files, or an address is not free.
@@ -298,7 +301,7 @@ def make(share: LoadShare, supervised: bool = False) -> dict[str, Any]:
 
 
 def main(argument: str) -> int:
-    """Make one share of a load; its counts go to standard output."""
+    """Run one share of a load; print its counts to standard output."""
     try:
         json.dump(make(LoadShare(**json.loads(argument)), supervised=True), sys.stdout)
     except DvaSimError as error:

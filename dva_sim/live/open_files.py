@@ -1,4 +1,4 @@
-"""Limit of devices per process: each needs some of the files that the process may open."""
+"""Limit of devices per process, due to the limit of open files."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Final, NamedTuple
 from dva_sim.core.registry import MAX_DEVICES
 from dva_sim.kernel.errors import DvaSimError
 
-PER_DEVICE: Final = 16  # at the DVA
+PER_DEVICE: Final = 16  # open files that a device needs at the DVA
 OWN_FILES: Final = 200  # files of the program itself
 
 
 class DeviceRoom(NamedTuple):
-    """Devices that fit, and the files that may be open."""
+    """Number of devices that fit, and limit of open files."""
 
     devices: int
     files: int
@@ -23,16 +23,16 @@ class DeviceRoom(NamedTuple):
 
 
 def room_here() -> DeviceRoom:
-    """Return how many devices fit, with as many open files as the system allows."""
+    """Return the number of devices that fit, after raising the limit of open files."""
     usable = _usable()
     return DeviceRoom(max(1, min(MAX_DEVICES, (usable - OWN_FILES) // PER_DEVICE)), usable)
 
 
 def check_room_for(devices: int) -> None:
-    """Refuse to begin where devices would be turned away one by one.
+    """Refuse to start if some devices could not connect.
 
     Raises:
-        DvaSimError: how many files may be open, and how many it takes.
+        DvaSimError: too few files may be open; the message has both numbers.
     """
     usable = _usable()
     needed = OWN_FILES + devices * PER_DEVICE

@@ -21,15 +21,20 @@ from dva_sim.recordings.writing import check_both, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
 
-ROSBRIDGE = "rosbridge"  # part for clients of ROS, which is never run alone
+ROSBRIDGE = "rosbridge"  # name of the part for clients of ROS, which never runs alone
 PATHS = ("keys", "record", "state")  # options that name files
-CAMERA_PORT = 8764  # of the robots' pictures; if it is taken, any that is free
-TRACED = {None: "*", "dva": "dva", "world": "robot-*", "operator": ""}  # by who is run alone
-AS_IN_SCENARIO = "scenario"  # in place of keys of the emulated link
+CAMERA_PORT = 8764  # preferred port for the robots' pictures
+TRACED = {
+    None: "*",
+    "dva": "dva",
+    "world": "robot-*",
+    "operator": "",
+}  # pattern of traced labels, by `--only`
+AS_IN_SCENARIO = "scenario"  # value of `--link` for the scenario's own link
 
 
 def scenario_of(options: LiveOptions) -> Scenario:
-    """Return the scenario with its changes.
+    """Load the scenario with its changes.
 
     Raises:
         ConfigError: it is not valid, or cannot be run live.
@@ -66,10 +71,10 @@ def addresses_of(options: LiveOptions | ConsoleOptions) -> list[str]:
 
 
 def check_count(options: LiveOptions | ConsoleOptions, scenario: Scenario) -> int:
-    """Return the number of DVAs of a scenario, if addresses are given for all, or none.
+    """Return the number of DVAs of a scenario, after checking the number of addresses.
 
     Raises:
-        ConfigError: they are not one for each region.
+        ConfigError: the number of addresses is not that of the regions.
     """
     addresses = len(addresses_of(options))
     count = max(1, len(scenario.dva.regions))
@@ -80,7 +85,7 @@ def check_count(options: LiveOptions | ConsoleOptions, scenario: Scenario) -> in
 
 
 def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
-    """Refuse what several DVAs cannot do over sockets, and addresses that are not one for each."""
+    """Reject a wrong number of addresses, and options for a single DVA if there are several."""
     count = check_count(options, scenario)
     if scenario.dva.deaths:
         raise ConfigError("dva.deaths: only in virtual time; end the process of a DVA instead")
@@ -93,11 +98,11 @@ def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
 
 
 def check(options: LiveOptions) -> Scenario:
-    """Return the scenario once everything in it has been placed for a trial.
+    """Return the scenario after checking all options, with a trial placement of the team.
 
     Raises:
-        ConfigError: see `scenario_of`; or the site has no place for the team, or what is recorded
-            cannot be put where it is wanted.
+        ConfigError: see `scenario_of`; or the site has no place for the team, or the recording
+            cannot be written.
         DvaSimError: this process may open too few files for the team.
     """
     scenario = scenario_of(options)
@@ -131,13 +136,13 @@ def check(options: LiveOptions) -> Scenario:
 
 
 def _check_emulated(options: LiveOptions, scenario: Scenario) -> None:
-    others = {
+    exclusive = {
         "--only": options.only is not None,
         "--dva": options.dva is not None,
         "--host": options.host != LOCALHOST,
         "--camera-port": options.camera_port is not None,
     }
-    if excluded := [name for name, is_given in others.items() if is_given]:
+    if excluded := [name for name, is_given in exclusive.items() if is_given]:
         raise ConfigError(
             f"{excluded[0]} cannot be given with --link, where all parts run in networks of their "
             "own"
@@ -165,7 +170,7 @@ def _check_record(options: LiveOptions, record: Path) -> None:
 
 
 def check_emulated(link: LinkConfig, seed: int) -> None:
-    """Refuse a link that cannot be emulated.
+    """Reject a link that cannot be emulated.
 
     Raises:
         ConfigError: it has partitions, or names a file that cannot be read.
@@ -187,8 +192,8 @@ def changes_by_link(words: Sequence[str]) -> tuple[str, ...]:
     """Return the changes of a scenario, as `KEY=VALUE`, that give it the emulated link.
 
     Args:
-        words: Keys of the link with new values, and at most one file of a link, which takes the
-            place of the scenario's; `scenario` is the scenario's own.
+        words: Keys of the link with new values, and at most one file of a link, which replaces
+            the scenario's link; `scenario` stands for the scenario's link.
 
     Raises:
         ConfigError: it is not a valid link.

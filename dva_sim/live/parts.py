@@ -45,7 +45,7 @@ from dva_sim.simulation.full.stage import Stage
 from dva_sim.simulation.scenario import Scenario
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
-SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
+SESSIONS_PER_SECOND = 4  # 32 bits last for 34 years
 
 Row = dict[str, Any]
 
@@ -54,23 +54,23 @@ class LivePart(Protocol):
     """Process of a live run."""
 
     def rows(self) -> list[Row]:
-        """Return one line per device for the table; only what this part knows."""
+        """Return a table row per device, with what this part knows."""
 
     def settled(self) -> bool:
-        """Return True if, as far as this part knows, nothing more will happen."""
+        """Return True if this part expects no further activity."""
 
     def has_company(self) -> bool:
-        """Return True if anybody has ever answered that this part depends on."""
+        """Return True if a device that this part depends on has ever answered."""
 
     def keep(self, recorder: LiveRecorder) -> None:
-        """Say for the recording what is new, once a second."""
+        """Write changes to the recording, once a second."""
 
     def finish(self) -> None:
-        """Leave everything in a safe state; a moment is left for last words."""
+        """Bring everything into a safe state; last messages are still sent."""
 
 
-def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str], object] | None:
-    """Return what takes the lines of decisions of a robot or the DVA, if they are wanted."""
+def _make_trace(label: str, stage: Stage, options: LiveOptions) -> Callable[[str], object] | None:
+    """Return the writer of a decider's trace, for a robot or the DVA; None without tracing."""
     recorder = stage.recorder
     if isinstance(recorder, LiveRecorder) and recorder.keeps:
         return TraceLines(recorder, label)
@@ -85,21 +85,22 @@ class DvaPart:
 
     Attributes:
         agent: The DVA.
-        aside: Devices beside it that do not count as company.
+        aside: Own devices, which do not count as company.
 
     Raises:
-        ConfigError: the file for its memory cannot be used.
+        ConfigError: the state file cannot be used.
     """
 
     def __init__(self, stage: Stage, options: LiveOptions, number: int = 1) -> None:
-        # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
-        # long as that handed out no more than so many a second and the clock was not set back: then
-        # robots take the lower ones, too, as they ask. A clock may know no date at all.
+        # Session numbers start at a value that nobody can guess and that grows with the date. They
+        # are higher than before a restart, unless the DVA granted more than SESSIONS_PER_SECOND or
+        # the clock was set back; then robots, which ask the DVA, accept lower ones. The clock may
+        # also have no date at all.
         count = max(1, int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND))
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         memory = None
         if options.state is not None:
-            memory = Store(_state_of(options.state, stage, number))
+            memory = Store(_state_file(options.state, stage, number))
         life = int(time.time())
         self.agent = add_dva(
             stage, permissions, memory, keep_events=False, number=number, life=life
@@ -108,7 +109,7 @@ class DvaPart:
         self.agent.core.registry.most = room.devices
         self.agent.device.tell(str(room), "link")
         self.agent.stopwatch = time.perf_counter
-        trace = _trace_of("dva", stage, options)
+        trace = _make_trace("dva", stage, options)
         if trace is not None and stage.regions is None:
             self.agent.core = traced(self.agent.core, trace, stage, memory)
         if isinstance(stage.recorder, LiveRecorder):
@@ -117,13 +118,13 @@ class DvaPart:
         self._dispatcher = add_dispatcher(stage)
         self._stage = stage
         events = self.agent.core.events
-        self._scripted = options.operators == "scripted"  # who follows a script settles no event
+        self._scripted = options.operators == "scripted"  # scripted operators do not settle events
         self._settled_before = 0 if events.open else events.total
         self._table = DeviceTable(lambda: self.agent)
         self.aside: set[str] = set()
 
     def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
-        """Let the recorder have what is decided, and what the book shows, twice a second."""
+        """Record all decisions, and the device table twice a second."""
         agent = self.agent
         clock = stage.clock
         agent.on_fact = lambda fact: recorder.put("fact", fact.row())
@@ -139,15 +140,15 @@ class DvaPart:
         clock.every(WATCH_PERIOD, lambda: log.shows(clock.now, page_of(agent)))
 
     def keep(self, recorder: LiveRecorder) -> None:
-        """See `LivePart`: how the events stand."""
+        """Record the states of events."""
         keep_events(recorder, self.agent.core.events)
 
     def rows(self) -> list[Row]:
-        """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
+        """Return a row for each of the first devices, with present devices first."""
         return [_device_row(booked) for booked in self._table.rows()]
 
     def events(self) -> list[Row]:
-        """Return the events, as the DVA knows them."""
+        """Return the events known to the DVA."""
         return [{"number": e.number, "kind": e.kind, "state": str(e.state)} for e in self._events()]
 
     def settled(self) -> bool:
@@ -156,21 +157,21 @@ class DvaPart:
         return self._scripted or (events.total > self._settled_before and not events.open)
 
     def _events(self) -> list[Event]:
-        """Return the last that were closed, and all that are open."""
+        """Return all open events and the last closed ones."""
         events = self.agent.core.events
         return [*events.closed.values(), *events.open.values()]
 
     def has_company(self) -> bool:
-        """See `LivePart`: some device has registered."""
+        """Return True if any device has registered."""
         return not self.agent.core.registry.entries.keys() <= self.aside
 
     def finish(self) -> None:
-        """See `LivePart`: nobody drives any longer by our permission."""
+        """Revoke all permissions."""
         self.agent.close()
 
 
-def _state_of(path: Path, stage: Stage, number: int) -> Path:
-    """Return the file for the memory of a DVA; of several, each has its own."""
+def _state_file(path: Path, stage: Stage, number: int) -> Path:
+    """Return the state file of a DVA; each of several DVAs has its own."""
     if stage.regions is None:
         return path
     return path.with_name(f"{path.stem}-{stage.regions.names[number - 1]}{path.suffix}")
@@ -190,7 +191,7 @@ def _device_row(booked: BookedDevice) -> Row:
 
 @dataclass(frozen=True)
 class _FilmedWorld:
-    """The world as the camera service needs it; see `FilmedRun`."""
+    """The world for the camera service; see `FilmedRun`."""
 
     scenario: Scenario
     clock: Clock
@@ -209,13 +210,13 @@ class WorldPart:
         self._commands: dict[str, Rate] = {}
         self._scripted = options.operators == "scripted"
         for label, robot in ((r.device.label, r) for r in self._field.robots.values()):
-            trace = _trace_of(label, stage, options)
+            trace = _make_trace(label, stage, options)
             robot.trace = None if trace is None else DecisionLog(trace, robot.controller)
         if isinstance(stage.recorder, LiveRecorder):
             self._observe(stage.recorder)
 
     def _observe(self, recorder: LiveRecorder) -> None:
-        """Let the recorder have what robots accept, how they move, and where everybody is."""
+        """Record accepted commands, motion of robots, and all positions."""
         robots = self._field.robots
         log = FactLog(
             recorder.observe, robots, lambda robot: motion_of(robots[robot]), keeps_sent=False
@@ -228,7 +229,7 @@ class WorldPart:
         clock.every(WATCH_PERIOD, lambda: log.places(clock.now, self._field.places()))
 
     def film(self, service: CameraService) -> None:
-        """Let a service show what the robots see."""
+        """Let a service serve the pictures of the robots."""
         stage = self._stage
         run = _FilmedWorld(stage.scenario, stage.clock, stage.network, self._field)
         service.film(run, stage.seed)
@@ -242,11 +243,11 @@ class WorldPart:
         log.moves(now, {name: motion_of(robot) for name, robot in robots})
 
     def keep(self, recorder: LiveRecorder) -> None:
-        """See `LivePart`: who there is, and which hazards are dealt with."""
+        """Record the team and the contained hazards."""
         keep_team(recorder, self._stage.labels, self._field)
 
     def rows(self) -> list[Row]:
-        """See `LivePart`: how robots and guards are."""
+        """Return a row for each robot and guard."""
         now = self._stage.clock.now
         self._field.world.advance_to(now)
         robots = [self._robot_row(robot, now) for robot in self._field.robots.values()]
@@ -271,9 +272,7 @@ class WorldPart:
         }
 
     def settled(self) -> bool:
-        """See `LivePart`: all that will be noticed was reported, or is no matter of a script; and
-        every robot is idle.
-        """
+        """Return True if all events were reported or need no script, and all robots are idle."""
         detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
         is_settled = self._stage.clock.now > max(detected, default=0.0) + 2.0
         return (is_settled or self._scripted) and all(
@@ -281,17 +280,17 @@ class WorldPart:
         )
 
     def has_company(self) -> bool:
-        """See `LivePart`: the DVA has answered one of those who are out here."""
+        """Return True if the DVA has answered a robot or guard."""
         robots = [robot.device for robot in self._field.robots.values()]
         devices = [*robots, *(guard.device for guard in self._field.guards)]
         return any(device.round_trips for device in devices)
 
     def finish(self) -> None:
-        """See `LivePart`: robots stop by themselves."""
+        """Do nothing: robots stop by themselves."""
 
 
 class OperatorPart:
-    """One operator: a simulated person, or one who follows a script."""
+    """One operator: a simulated person, or a script."""
 
     def __init__(self, stage: Stage, options: LiveOptions, number: int) -> None:
         self._stage = stage
@@ -305,7 +304,7 @@ class OperatorPart:
             self._agent = add_operator(stage, number)
 
     def rows(self) -> list[Row]:
-        """See `LivePart`: what the operator does, and how the phone finds the link."""
+        """Return a row with the operator's activity and the phone's measurements of the link."""
         now = self._stage.clock.now
         agent = self._agent
         row: Row = {"label": agent.device.label, "doing": agent.activity}
@@ -320,7 +319,7 @@ class OperatorPart:
         return [row]
 
     def keep(self, recorder: LiveRecorder) -> None:
-        """See `LivePart`: how the drives stand."""
+        """Record the progress of drives."""
         recorder.catch_up()
 
     def settled(self) -> bool:
@@ -332,12 +331,12 @@ class OperatorPart:
         return bool(self._agent.device.round_trips)
 
     def finish(self) -> None:
-        """Order a robot that is still driven to stop; see `LivePart`."""
+        """Order a robot that is still driven to stop."""
         self._agent.put_down()
 
 
 class RosbridgePart:
-    """Serves the robots of the run to clients of ROS, by what their messages say."""
+    """Serves the robots of the run to clients of ROS, from the robots' messages."""
 
     def __init__(self, stage: Stage, door: OpenPort) -> None:
         clock = stage.clock
@@ -353,15 +352,15 @@ class RosbridgePart:
         )
 
     def rows(self) -> list[Row]:
-        """See `LivePart`: nothing; its devices are on the DVA's list."""
+        """Return nothing: the devices are in the rows of the DVA."""
         return []
 
     def keep(self, recorder: LiveRecorder) -> None:
-        """See `LivePart`: how the drives of clients stand."""
+        """Record the progress of clients' drives."""
         recorder.catch_up()
 
     def settled(self) -> bool:
-        """See `LivePart`: no client is in control."""
+        """Return True if no client controls a robot."""
         return not self._gateway.is_driving
 
     def has_company(self) -> bool:
@@ -369,7 +368,7 @@ class RosbridgePart:
         return bool(self._gateway.device.round_trips)
 
     def finish(self) -> None:
-        """See `LivePart`: what clients drive is stopped."""
+        """Stop the robots that clients drive."""
         self._server.close()
 
 

@@ -10,16 +10,16 @@ from contextlib import suppress
 
 from dva_sim.live.judging import LiveJudge
 
-PIPE_BYTES = 1024 * 1024  # that may wait to be taken
+PIPE_BYTES = 1024 * 1024  # capacity of a pipe
 
 
 class Inlets:
     """Pipes that parts write lines into, each read by a thread.
 
     Args:
-        keep: Callback for whole lines; None: nobody keeps them.
-        judge: Likewise.
-        also: Likewise, after them.
+        keep: Callback that keeps whole lines; None: they are not kept.
+        judge: Callback that judges whole lines; None: they are not judged.
+        also: Further callback for whole lines, called last; optional.
     """
 
     def __init__(
@@ -46,17 +46,17 @@ class Inlets:
         return writes
 
     def _take(self, number: int, reads: int) -> None:
-        """Take whole lines until the part has ended, however it did."""
-        rest = b""
+        """Pass on whole lines until the part has ended, even by a crash."""
+        unfinished = b""
         keep, judge = self._takers
         while data := os.read(reads, 1 << 18):
-            whole, _, rest = (rest + data).rpartition(b"\n")
-            if whole and keep is not None:
-                keep(whole + b"\n")
-            if whole and judge is not None:
-                judge.hear(number, whole.split(b"\n"))
-            if whole and self._also is not None:
-                self._also(whole)
+            lines, _, unfinished = (unfinished + data).rpartition(b"\n")
+            if lines and keep is not None:
+                keep(lines + b"\n")
+            if lines and judge is not None:
+                judge.hear(number, lines.split(b"\n"))
+            if lines and self._also is not None:
+                self._also(lines)
         os.close(reads)
         if judge is not None:
             judge.leaves(number)

@@ -31,20 +31,20 @@ from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, Stage, dvas_of, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
 
-REPORT_PERIOD = 1.0  # [s]
-LAST_WORDS = 0.5  # between the end and closing the sockets [s]
+REPORT_PERIOD = 1.0  # interval between two reports [s]
+LAST_WORDS = 0.5  # time for last messages before the sockets are closed [s]
 DVA_WAIT_S = 30.0  # longest wait of a lone part for a DVA that does not answer [s]
 
 
 @dataclass(frozen=True)
 class ServedDva:
-    """A DVA that this process runs, for what is beside it.
+    """A DVA of this process, for the programs beside it.
 
     Attributes:
         agent: The DVA.
-        network: Network that it takes part in.
+        network: Network of the DVA.
         aside: Devices that do not count as its company; see `DvaPart`.
-        tell: Adds a line to the timeline.
+        tell: Function that adds a line to the timeline.
     """
 
     agent: DvaAgent
@@ -54,11 +54,11 @@ class ServedDva:
 
     @property
     def address(self) -> str:
-        """Address at which it listens."""
+        """Address that the DVA listens on."""
         return str(self.network.address(self.agent.device.id_tag))
 
     def appoint(self, room: str, role: ControlRoomRole) -> None:
-        """Give the control room beside it a role."""
+        """Give the control room beside the DVA a role."""
         self.aside.add(room)
         self.agent.core.roles.appoint(room, role)
 
@@ -74,7 +74,7 @@ class Beside(Protocol):
 
 
 class NobodyThere(RunsFailed):
-    """A part has waited in vain for those whom it is nothing without."""
+    """Lack of any answer from the devices that a part depends on."""
 
 
 @dataclass
@@ -84,14 +84,14 @@ class Report:
     Attributes:
         part: `dva`, `world` or `operator`.
         number: Number of the operator.
-        time: Since the start of the run [s].
+        time: Time since the start of the run [s].
         rows: See `LivePart.rows`.
-        events: The events, from the DVA.
+        events: Events; only from the DVA.
         story: New lines of the timeline: time [s], who, what, kind.
         counters: Messages refused or dropped so far, by reason.
         settled: See `LivePart.settled`.
-        dva: Address of the DVA, from the DVA.
-        lateness: The longest that an event had to wait for the processor [s].
+        dva: Address of the DVA; only from the DVA.
+        lateness: Longest wait of an event for the processor [s].
     """
 
     part: str
@@ -117,10 +117,10 @@ def run_part(
     door: OpenPort | None = None,
     beside: Beside | None = None,
 ) -> list[Verdict]:
-    """Be one part until the end of the run, Ctrl-C, SIGTERM, SIGHUP, or the end of standard input.
+    """Run a part until the end of the run, Ctrl-C, SIGTERM, SIGHUP, or the end of standard input.
 
-    A part that is alone gives up if it has heard of nobody for `DVA_WAIT_S`. A DVA that is alone
-    serves others, and lasts until it is ended, or for as long as the options say.
+    A part without a supervisor gives up if nobody answers for `DVA_WAIT_S`. A DVA without a
+    supervisor serves until it is ended, or for the time in the options.
 
     Args:
         name: `dva`, `world` or `operator`.
@@ -129,20 +129,20 @@ def run_part(
             It returns False if there was no room for the report.
         number: Number of the operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
-        supervised: True to end when standard input does: the parent process has gone.
-        outlet: Number of the open file that takes what is recorded, and judged. None: this part
-            does both alone.
-        door: Port for clients of other makes, if this part serves them.
+        supervised: True to end at the end of standard input, when the parent process has ended.
+        outlet: File descriptor for lines that are recorded and judged elsewhere. None: this part
+            records and judges them itself.
+        door: Port for clients of other makers, if this part serves them.
         beside: Program that runs beside a DVA, such as its page.
 
     Returns:
-        How the safety rules have fared, as far as this part can tell; none with an outlet.
+        Verdicts on the safety rules from the facts of this part; none with an outlet.
 
     Raises:
-        ConfigError: scenario, keys or part are not as they should be.
-        DvaSimError: what was to be recorded is not, or not all of it.
+        ConfigError: scenario, keys or part are invalid.
+        DvaSimError: the recording is missing or incomplete.
         NetworkError: a port is taken.
-        NobodyThere: this part stayed alone.
+        NobodyThere: no other part answered.
     """
     alone = RunKeeping(options, scenario_of(options)) if outlet is None else None
     out = PipeEnd(alone.inlet() if alone is not None else outlet or 0)
@@ -210,9 +210,9 @@ def _run_part(
             cameras=cameras,
             attended=True,
         )
-        here = id_of("dva", number) if name == "dva" else ""
+        own_id = id_of("dva", number) if name == "dva" else ""
         for dva, address in zip(dvas_of(scenario), addresses_of(options), strict=False):
-            if dva != here:
+            if dva != own_id:
                 network.introduce(dva, address)
         part = make_part(name, stage, options, number, door)
         if options.dva is not None and not (stage.regions is not None and name == "dva"):
@@ -224,17 +224,17 @@ def _run_part(
         if beside is not None and isinstance(part, DvaPart) and stage.regions is None:
             at_end.callback(beside.end)
             beside.begin(ServedDva(part.agent, network, part.aside, tell))
-        gc.freeze()  # what stays for the whole run is not looked through again and again
+        gc.freeze()  # objects that last for the whole run need no collection
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: reporter.tell(say))
         serves = name == "dva" and not supervised
-        usual = math.inf if serves else scenario.horizon_s
-        lasts = usual if options.duration is None else options.duration
+        default_duration = math.inf if serves else scenario.horizon_s
+        lasts = default_duration if options.duration is None else options.duration
         patience = lasts if serves else min(DVA_WAIT_S, lasts)
         with ending_when_asked(clock, supervised) as ending:
             if not supervised:
                 clock.run(patience)
-                own = network.address(here or DVA)
+                own = network.address(own_id or DVA)
                 _refuse_to_be_alone(name, part, own, patience, ending)
             if not ending.is_asked:
                 clock.run(lasts)
@@ -257,17 +257,17 @@ def _refuse_to_be_alone(
 
 
 def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
-    """Return when the run started, by the wall clock [s since midnight], and whether exactly."""
+    """Return the start of the run by the wall clock [s since midnight]; and whether it is exact."""
     started = time.time() - clock.now
     local = time.localtime(started)
-    whole = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec
-    return whole + started % 1.0, True
+    seconds = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec
+    return seconds + started % 1.0, True
 
 
 def _joining(
     network: RealNetwork, options: LiveOptions, name: str, of: int
 ) -> Callable[[str, int], str]:
-    """Return a function that gives each new device of this process two ports, and its address."""
+    """Return a function that assigns two ports to each new device, and returns its address."""
     next_port = options.port
 
     def join(kind: str, number: int) -> str:
@@ -337,8 +337,8 @@ def ending_when_asked(clock: LiveClock, supervised: bool) -> Iterator[EndRequest
     """Stop the clock on SIGINT, SIGTERM, SIGHUP, or the end of standard input.
 
     Args:
-        clock: Clock of what runs.
-        supervised: True to end when standard input does.
+        clock: Clock of the run.
+        supervised: True to end at the end of standard input.
     """
     ending = EndRequest()
 

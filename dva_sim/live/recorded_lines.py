@@ -1,7 +1,7 @@
 """A recording made of the lines that the parts of a live run have written.
 
-The lines stand in `FILE.mcap.part` until the run ends, and stay there when it is killed. What reads
-them changes nothing: their run may still go on.
+The lines are in `FILE.mcap.part` until the run ends, and remain there if it is killed. Reading
+never changes them, as the run may still write.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.kernel.streams import Streams
-from dva_sim.live.judging import Facts, observation_of
+from dva_sim.live.judging import Facts, read_observation
 from dva_sim.protocol.facts import Fact
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings.writing import (
@@ -37,21 +37,21 @@ from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import Surroundings
 
-FORMAT = 1  # of the lines
-MAX_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
+FORMAT = 1  # version of the lines
+MAX_BYTES = 128 * 1024 * 1024  # maximum size of a file of lines: about an hour of driving
 
 Line = list[Any]
 
 
 def record(part: Path, target: Path) -> float:
-    """Make a recording of the lines that a run left, which stay; return its duration [s].
+    """Make a recording from the lines of a run, without removing them; return its duration [s].
 
     Args:
-        part: The lines. Their run may still go on.
+        part: File of the lines; the run may still write to it.
         target: The recording.
 
     Raises:
-        DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
+        DvaSimError: the lines are missing, they name a class in a file, or the recording cannot
             be written.
     """
     lines = lines_of_part(part)
@@ -86,20 +86,20 @@ def make_recording(lines: RunLines, target: Path) -> float:
 
 
 def is_part(file: Path) -> bool:
-    """Return True if a file is named as the lines of a run, running or killed."""
+    """Return True if a file has the name of lines of a running or killed run."""
     return file.suffix == PART
 
 
 @contextmanager
 def readable(file: Path, to: Path | None = None) -> Iterator[Path]:
-    """Yield a recording to read: the file itself, or one made of its lines for the moment.
+    """Yield a recording to read: the file itself, or a temporary one made from its lines.
 
     Args:
         file: A recording, or the lines of a run.
-        to: Path at which to keep the recording that is made, if wanted.
+        to: Path for a permanent recording; optional.
 
     Raises:
-        DvaSimError: it cannot be made, or there is nothing to be made.
+        DvaSimError: the recording cannot be made, or is not needed.
     """
     if not is_part(file):
         if to is not None:
@@ -117,8 +117,8 @@ def readable(file: Path, to: Path | None = None) -> Iterator[Path]:
         yield made
 
 
-def _all_of(file: IO[bytes]) -> bytes:
-    """Return the content of an unbuffered file, which may return less than is asked for."""
+def _read_all(file: IO[bytes]) -> bytes:
+    """Return the content of an unbuffered file, whose `read` may return less than requested."""
     pieces = list[bytes]()
     while piece := file.read(1 << 24):
         pieces.append(piece)
@@ -129,8 +129,8 @@ class RunLines:
     """The lines of a run, sorted.
 
     Args:
-        file: Holds them.
-        part: Its name.
+        file: Open file of the lines.
+        part: Path of the file.
 
     Raises:
         ConfigError: they cannot be read, or are something else.
@@ -149,11 +149,11 @@ class RunLines:
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
             file.seek(0)
-            first, *lines = _all_of(file).split(b"\n")
+            first, *lines = _read_all(file).split(b"\n")
             self.start = json.loads(first)
             if self.start["format"] > FORMAT:
                 raise ValueError("made by a later version")
-            # What is behind the last end of a line is not whole.
+            # The text after the last line break is an incomplete line.
             reports = [json.loads(line) for line in lines[:-1]]
             for kind, *values in reports:
                 getattr(self, f"_{kind}")(*values)
@@ -164,7 +164,7 @@ class RunLines:
             raise ConfigError(f"contains no lines of a live run: {error}", part) from error
 
     def playback(self) -> Playback:
-        """Return the run for telling and drawing."""
+        """Return the run for stories and pictures."""
         scenario = Scenario.model_validate(self.start["scenario"])
         seed = self.start["seed"]
         site = site_of(scenario, seed)
@@ -237,7 +237,7 @@ class RunLines:
 
     def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
         size = self.start["scenario"]["camera"]["frame_bytes"]
-        frame = CameraFrame(observation_of(seen), captured)
+        frame = CameraFrame(read_observation(seen), captured)
         self._traffic_of.append(Sent(when, robot, "", size, frame))
 
     def _here(self, when: float, _: list[str]) -> None:
@@ -268,7 +268,7 @@ class RunLines:
         self._contained[number] = when
 
     def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
-        """Read an event; facts that an earlier version did not record stay unknown."""
+        """Read an event; older versions did not record all its values."""
         times, severity, sent = (*more, 0.0, {})[:3]
         event = Event(
             number, kind, Position(*at), severity, state=State(state), times=times, **sent
@@ -282,14 +282,14 @@ class RunLines:
         self.audit.append((float(row["time_s"]), row))
 
     def _cameras(self, _: str) -> None:
-        """Leave out pictures, which are no part of a recording."""
+        """Ignore the address of pictures, which are not recorded."""
 
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))
 
 
 def _facts_in(lines: Sequence[Line]) -> list[Any]:
-    """Return the facts in order of time, those of one part in the order of their lines."""
+    """Return the facts in order of time; those of the same part keep the order of their lines."""
     reads = Facts(most=None)
     for line in lines:
         reads.note(line)

@@ -1,10 +1,10 @@
-"""A live run as a recording: parts report to one file, which becomes MCAP in the end.
+"""Recording of a live run: parts write lines to one file, from which MCAP is made at the end.
 
-Each part writes lines into a pipe and never waits: what has no room is dropped and counted. A
-thread of the supervisor puts them into `FILE.part`, so that no robot ever waits for a disk, and
-what a part has said is kept when it is killed. When all have ended, a recording is made of the
-lines, in the form of those of virtual runs. Of a run whose supervisor was killed `FILE.part` is
-left, and can be read like a recording; nothing that reads it changes it.
+Each part writes lines into a pipe and never waits: lines that do not fit are dropped and counted. A
+thread of the supervisor copies them to `FILE.part`, so that no robot waits for a disk, and the
+lines of a killed part are kept. When all parts have ended, the lines become a recording like that
+of a virtual run. If the supervisor is killed, `FILE.part` remains, and can be read like a
+recording.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from dva_sim.simulation.full.observations import FactGap, FactLog, terms_of
 from dva_sim.simulation.full.verdicts import Verdict, rules_on
 from dva_sim.simulation.scenario import Scenario
 
-BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
-SPARE = 0.5  # share of them for what strangers cause, and for what no rule is judged by
-MAX_ASKED = 5000  # requests of strangers whose answers no rule is judged by
-MAX_FACTS = 20_000  # of which one knows that they were said
-MAX_FOREIGN = 200  # devices of another make whose messages are kept
+BYTES_PER_SECOND = 1024 * 1024  # maximum data rate of a part; a drive takes a twentieth [B/s]
+SPARE = 0.5  # share reserved for facts of this run's own devices
+MAX_ASKED = 5000  # maximum remembered requests of strangers that no rule needs
+MAX_FACTS = 20_000  # maximum remembered keys of lines, for `put_new`
+MAX_FOREIGN = 200  # maximum devices of other makers whose messages are kept
 _ENDS = re.compile(
     rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
 )
@@ -55,24 +55,24 @@ _NUMBER = re.compile(rb"<MessageID>\s*(\d{1,20})")
 _ANSWERS = re.compile(rb"<Answers>\s*(\d{1,20})")
 _ORDERED = b"<Order>", b"<TaskAward>"
 _ASKED = b"<RegMsg>", b"<GetDeviceList", b"<GetSensorInfo", b"<GetEventList", b"<GetDispatch"
-"""Starts of requests that no rule is judged by, unless they come from somebody with an order."""
+"""Starts of requests that no rule needs, unless their sender has an order."""
 _NOT_KEPT = "not recorded"
 
 Line = list[Any]
 
 
 class LiveRecorder(Recorder):
-    """A recorder whose part of the story goes to the recording at once.
+    """A recorder that writes to the recording at once.
 
     Args:
-        clock: The part's.
-        outlet: Takes lines.
-        keeps: Write everything for a recording; else only the facts that rules are judged by.
+        clock: Clock of the part.
+        outlet: Pipe for lines.
+        keeps: True to write everything for a recording; otherwise only facts for the rules.
 
     Attributes:
-        log: Callback for the facts that this part sees; None: it sees neither robots nor the DVA.
-        is_own: Predicate for device ids of this run: their messages are kept where they are sent,
-            those of others where they arrive.
+        log: Callback for the facts that this part observes; None if it has neither robots nor DVA.
+        is_own: Predicate for device ids of this run: their messages are recorded where they are
+            sent, those of other devices where they arrive.
         team: Ids of all devices of the run, wherever they are; all others are strangers.
     """
 
@@ -83,12 +83,12 @@ class LiveRecorder(Recorder):
         self.keeps = keeps
         self.log: FactLog | None = None
         self._filmed = set[str]()
-        self._gaps: dict[bool, FactGap] = {}  # not written yet, by whether they are strangers'
+        self._gaps: dict[bool, FactGap] = {}  # not written yet; True: of strangers
         self.is_own: Callable[[str], bool] = lambda _: False
         self.team: Container[str] = ()
         self._ordered: set[str] = set()
-        self._of_strangers = False  # the fact that is observed now
-        self._asked: OrderedDict[tuple[str, bytes], None] = OrderedDict()
+        self._of_strangers = False  # True while a stranger's fact is observed
+        self._request_keys: OrderedDict[tuple[str, bytes], None] = OrderedDict()
         self._foreign: set[str] = set()
         self._second = 0
         self._room = BYTES_PER_SECOND
@@ -96,15 +96,15 @@ class LiveRecorder(Recorder):
         self._facts: dict[str, Any] = {}
 
     def put(self, *line: Any) -> bool:
-        """Keep a line, and return whether that was possible; a gap in the facts is noted later."""
+        """Write a line; return False if it does not fit. A gap in the facts is noted later."""
         is_fact = line[0] in JUDGED
         return self._put_as(line, is_fact=is_fact, of_strangers=False)
 
     def _put_as(self, line: Sequence[Any], is_fact: bool, of_strangers: bool) -> bool:
-        """Keep a line, of strangers or of no fact only while enough room is left for our facts."""
+        """Write a line; leave the reserved room to facts of our own devices."""
         if not self.keeps and line[0] not in JUDGED:
             return True
-        is_kept = self._notes_gaps() and self._put(line, spare=of_strangers or not is_fact)
+        is_kept = self._write_gaps() and self._put(line, spare=of_strangers or not is_fact)
         if is_fact and not is_kept:
             self._lose(of_strangers)
         return is_kept
@@ -118,10 +118,10 @@ class LiveRecorder(Recorder):
         before = self._gaps.get(of_strangers, FactGap(now, 0, now, rules))
         self._gaps[of_strangers] = before._replace(missing=before.missing + 1)
 
-    def _notes_gaps(self) -> bool:
-        """Write where facts are missing, if there are such places; False: there is no room yet."""
+    def _write_gaps(self) -> bool:
+        """Write notes of missing facts, if any; return False if they do not fit yet."""
         for of_strangers, gap in list(self._gaps.items()):
-            if of_strangers and self._left() <= SPARE * BYTES_PER_SECOND:
+            if of_strangers and self._free_bytes() <= SPARE * BYTES_PER_SECOND:
                 continue
             word, time, values = as_plain(gap._replace(time=self._clock.now))
             if not self._put([SEEN, time, word, values]):
@@ -129,15 +129,15 @@ class LiveRecorder(Recorder):
             del self._gaps[of_strangers]
         return True
 
-    def _left(self) -> int:
-        """Return the room that is left in this second [B]."""
+    def _free_bytes(self) -> int:
+        """Return the number of bytes that may still be written in this second."""
         if (second := int(time.monotonic())) != self._second:
             self._second = second
             self._room = BYTES_PER_SECOND
         return self._room
 
     def _put(self, line: Sequence[Any], spare: bool = False) -> bool:
-        has_room = self._left() > (SPARE * BYTES_PER_SECOND if spare else 0)
+        has_room = self._free_bytes() > (SPARE * BYTES_PER_SECOND if spare else 0)
         data = json.dumps(line).encode() if has_room else b""
         self._room -= len(data)
         is_kept = bool(data) and self._outlet.offer(data + b"\n")
@@ -145,23 +145,23 @@ class LiveRecorder(Recorder):
         return is_kept
 
     def put_new(self, *line: Any, key: str) -> None:
-        """Keep a line if it says something else than the last one of that key."""
+        """Write a line if it differs from the last one with that key."""
         if self._facts.get(key) != line and self.put(*line):
             if len(self._facts) >= MAX_FACTS:
                 self._facts.clear()
             self._facts[key] = line
 
     def observe(self, fact: Any) -> None:
-        """Keep a fact that the rules are judged by."""
+        """Write a fact for the safety rules."""
         word, time, values = as_plain(fact)
         self._put_as([SEEN, time, word, values], True, self._of_strangers)
 
     def is_alive(self) -> None:
-        """Note that all facts of this part up to now are written."""
+        """Write that all facts of this part up to now are written."""
         self.here(())
 
     def here(self, nodes: Iterable[str]) -> None:
-        """Note the devices of this process; only this part writes down what they send."""
+        """Note the devices of this process, whose messages only this part records."""
         self.put(OWN_SIDE, self._clock.now, sorted(nodes))
 
     @override
@@ -174,10 +174,10 @@ class LiveRecorder(Recorder):
         self.put("view", robot, [time, x, y, heading])
 
     def message(self, node: str, payload: Any, sent: bool) -> None:
-        """Note a message that a node of this process sends or takes."""
+        """Record a message that a node of this process sends or receives."""
         now = self._clock.now
         if isinstance(payload, CameraFrame):
-            if self.keeps or node not in self._filmed:  # the rules need the clock behind one
+            if self.keeps or node not in self._filmed:  # the rules need its capture time
                 self._filmed.add(node)
                 self.put(FRAME, now, node, payload.observation, payload.captured)
             return
@@ -199,12 +199,12 @@ class LiveRecorder(Recorder):
         return not (self.is_own(device) or device in self.team)
 
     def _note_sent(self, node: str, destination: str, payload: bytes) -> None:
-        """Keep a message of a device of ours; answers that no rule looks at are not facts."""
+        """Record a message of an own device; answers that no rule needs are not facts."""
         to_stranger = self._is_stranger(destination)
         if to_stranger and any(word in payload for word in _ORDERED):
             self._ordered.add(destination)
-        answers = _ANSWERS.search(payload) if to_stranger and self._asked else None
-        is_fact = answers is None or (destination, answers[1]) not in self._asked
+        answers = _ANSWERS.search(payload) if to_stranger and self._request_keys else None
+        is_fact = answers is None or (destination, answers[1]) not in self._request_keys
         line = SENT_LINE, self._clock.now, node, destination, payload.decode()
         self._put_as(line, is_fact, to_stranger)
 
@@ -218,7 +218,7 @@ class LiveRecorder(Recorder):
             return
         if is_stranger and self.log.sees_dva and self._only_asks(source, payload):
             self.log.heard(source)
-        elif self._left() <= (SPARE * BYTES_PER_SECOND if is_stranger else 0):
+        elif self._free_bytes() <= (SPARE * BYTES_PER_SECOND if is_stranger else 0):
             self._lose(is_stranger)
         elif self._is_message(payload):
             self._of_strangers = is_stranger
@@ -226,29 +226,29 @@ class LiveRecorder(Recorder):
             self._of_strangers = False
 
     def _only_asks(self, source: str, payload: bytes) -> bool:
-        """Return True for a request that no rule is judged by."""
+        """Return True for a request that no rule needs."""
         if source in self._ordered or not any(word in payload for word in _ASKED):
             return False
         if (number := _NUMBER.search(payload)) is not None:
-            self._asked[source, number[1]] = None
-            if len(self._asked) > MAX_ASKED:
-                self._asked.popitem(last=False)
+            self._request_keys[source, number[1]] = None
+            if len(self._request_keys) > MAX_ASKED:
+                self._request_keys.popitem(last=False)
         return True
 
     def _is_news(self, source: str, data: bytes) -> bool:
-        """Return True for a message from somebody who keeps no record for us."""
-        if self.is_own(source) or self._left() <= SPARE * BYTES_PER_SECOND:
+        """Return True for a message of a device outside of this run."""
+        if self.is_own(source) or self._free_bytes() <= SPARE * BYTES_PER_SECOND:
             return False
         if source not in self._foreign and len(self._foreign) >= MAX_FOREIGN:
             self.counters[_NOT_KEPT] += 1
             return False
         if not self._is_message(data):
-            return False  # it is counted where it is refused
+            return False  # counted where it is refused
         self._foreign.add(source)
         return True
 
     def _is_message(self, data: bytes) -> bool:
-        """Return True for a valid message; an invalid one uses up spare room as if it were kept."""
+        """Return True for a valid message; an invalid one uses up spare room like a valid one."""
         try:
             decode(data)
         except ProtocolError:
@@ -258,7 +258,7 @@ class LiveRecorder(Recorder):
         return True
 
     def catch_up(self) -> None:
-        """Keep what is new about the drives."""
+        """Write the changes of drives."""
         for number, drive in enumerate(self.drives):
             frames, commands = self._drawn.get(number, (0, 0))
             facts = [drive.robot, drive.operator, drive.event, drive.ordered]
@@ -270,29 +270,29 @@ class LiveRecorder(Recorder):
                 self._drawn[number] = len(drive.frames), len(drive.commands)
 
     def trace(self, who: str, line: str) -> bool:
-        """Keep a line of somebody's decisions."""
+        """Write a line of a decider's trace."""
         return self.put("trace", self._clock.now, who, line)
 
 
 class TraceLines:
-    """The trace of one who decides, into the recording; after a gap nothing could be replayed."""
+    """Trace of a decider in the recording; it ends at a gap, after which it cannot be replayed."""
 
     def __init__(self, recorder: LiveRecorder, who: str) -> None:
         self._recorder = recorder
         self._who = who
-        self._whole = True
+        self._is_complete = True
 
     def __call__(self, line: str) -> None:
-        """Keep a line, unless one was dropped."""
-        self._whole = self._whole and self._recorder.trace(self._who, line)
+        """Write a line, unless an earlier one was dropped."""
+        self._is_complete = self._is_complete and self._recorder.trace(self._who, line)
 
 
 class TraceFile:
-    """Trace in a file, each line before the next decision; a full disk ends it, no robot.
+    """Trace in a file, written before each next decision; a full disk ends the trace only.
 
     Args:
         path: File of the trace.
-        complain: Callback once no more can be written.
+        complain: Callback for the error once writing fails.
 
     Raises:
         ConfigError: it cannot be written.
@@ -306,7 +306,7 @@ class TraceFile:
             raise ConfigError(f"cannot be written: {error.strerror}", path) from error
 
     def __call__(self, line: str) -> None:
-        """Write a line, if nothing went wrong so far."""
+        """Write a line, unless writing has failed before."""
         data = line.encode() + b"\n"
         try:
             while data and self._file is not None:
@@ -319,10 +319,10 @@ class TraceFile:
 
 
 def _lock(file: IO[bytes], path: Path) -> None:
-    """Take a file for this process, as long as it is open.
+    """Lock a file for this process while it is open.
 
     Raises:
-        ConfigError: another one has it.
+        ConfigError: another process has locked it.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -331,10 +331,10 @@ def _lock(file: IO[bytes], path: Path) -> None:
 
 
 def _emptied(path: Path) -> IO[bytes]:
-    """Return a file to write, of which nothing is left if it takes a byte.
+    """Return an emptied, locked file; its old content is lost only if the disk takes a byte.
 
     Raises:
-        ConfigError: it does not, or another process has it.
+        ConfigError: it cannot be written, or another process has locked it.
     """
     try:
         with ExitStack() as stack:
@@ -349,19 +349,19 @@ def _emptied(path: Path) -> IO[bytes]:
 
 
 class Keeper:
-    """Puts what all parts say into one file.
+    """Writes the lines of all parts into one file.
 
     Args:
         target: The recording that is to be made.
         seed: Random seed.
-        judge: Judges it by the safety rules meanwhile; None: somebody else does that.
-        also: Callback for whole lines, too; optional.
+        judge: Judge of the safety rules during the run; None: the lines are judged elsewhere.
+        also: Further callback for whole lines; optional.
 
     Attributes:
-        inlets: Files that parts write to.
+        inlets: Pipes that parts write to.
 
     Raises:
-        ConfigError: it cannot be written.
+        ConfigError: the recording cannot be written.
     """
 
     def __init__(
@@ -388,7 +388,7 @@ class Keeper:
         return self.inlets.inlet()
 
     def keep(self, lines: bytes) -> None:
-        """Put whole lines into the file, as long as it takes them."""
+        """Write whole lines to the file until it fails or is full."""
         with self._lock:
             if self.problem is not None:
                 return
@@ -403,21 +403,21 @@ class Keeper:
                 self.problem = error.strerror or str(error)
 
     def close(self) -> None:
-        """Wait until all parts have ended; what they have said is in the file."""
+        """Wait until all parts have ended and their lines are in the file."""
         self.inlets.join()
         self._file.close()
 
     def finish(self) -> str | None:
-        """Make the recording when all parts have ended; in one line why not, or not all of it.
+        """Make the recording once all parts have ended; return a line if it is incomplete.
 
         Raises:
-            KeyboardInterrupt: its message says what is left.
+            KeyboardInterrupt: the message names the file of lines that remains.
         """
         self.inlets.join()
         try:
             if self.path.exists():
                 lines = lines_of_part(self.path)
-            else:  # the folder was removed meanwhile; the open file still has the lines
+            else:  # the folder was removed; the open file still has the lines
                 lines = RunLines(self._file, self.path)
                 self._target.parent.mkdir(parents=True, exist_ok=True)
             lasted = make_recording(lines, self._target)
@@ -433,16 +433,16 @@ class Keeper:
         return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
 
     def _not_recorded(self, why: str) -> str:
-        left = f"; {self.path} is left; dva-sim replay reads it" if self.path.exists() else ""
-        return f"{self._target} was not recorded: {why}{left}"
+        remainder = f"; {self.path} is left; dva-sim replay reads it" if self.path.exists() else ""
+        return f"{self._target} was not recorded: {why}{remainder}"
 
 
 class RunKeeping:
-    """Keeps a live run as a recording, if one is wanted, and judges it by the safety rules.
+    """Records a live run, if requested, and judges it by the safety rules.
 
     Args:
         options: Options of the run.
-        scenario: The scenario that is run.
+        scenario: Scenario of the run.
         also: Callback for whole lines, too; optional.
 
     Raises:
@@ -469,7 +469,7 @@ class RunKeeping:
         return self._inlets.inlet()
 
     def news(self) -> list[Moment]:
-        """Return the rules that were found broken since the last call; they are recorded, too."""
+        """Return the breaches since the last call, after recording them."""
         moments = self._judge.news()
         if self._keeper is not None:
             for moment in moments:
@@ -477,7 +477,7 @@ class RunKeeping:
         return moments
 
     def finish(self) -> str | None:
-        """Make the recording when all parts have ended; see `Keeper`."""
+        """Make the recording once all parts have ended; see `Keeper`."""
         self._inlets.join()
         self.news()
         return None if self._keeper is None else self._keeper.finish()

@@ -1,4 +1,4 @@
-"""One robot of ROS as a program: from the command line to its last word to the robot."""
+"""The program that connects a ROS robot to a DVA, and stops the robot at its end."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.lone_robot import lone_robot
 
-MAX_WAITING: Final = 1000  # lines; what is more is not told
+MAX_WAITING: Final = 1000  # maximum waiting lines; further ones are dropped
 OTHER_NUMBER: Final = "--number gives the robot another id"
-LAST_LINES: Final = 0.5  # for what waits when all is over [s]
+LAST_LINES: Final = 0.5  # time for printing waiting lines at the end [s]
 
 
 class LineWriter:
-    """Says lines in a thread of its own, in their order.
+    """Prints lines in a thread of its own, in their order.
 
     Args:
-        say: Called with each line; it may wait, as a terminal does that was told to, and fail.
+        say: Callback for each line, which may block, as a paused terminal does, and fail.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -46,7 +46,7 @@ class LineWriter:
         self._thread.start()
 
     def __call__(self, line: str) -> None:
-        """Say a line soon, or never if too many wait."""
+        """Queue a line, or drop it if too many wait."""
         with suppress(queue.Full):
             self._lines.put_nowait(line)
 
@@ -56,14 +56,14 @@ class LineWriter:
                 say(line)
 
     def close(self) -> None:
-        """Give what waits a moment."""
+        """Wait a moment for lines that are still queued."""
         with suppress(queue.Full):
             self._lines.put_nowait(None)
             self._thread.join(LAST_LINES)
 
 
-LAST_WORDS: Final = 0.3  # for the last command to stand [s]
-TELL_PERIOD: Final = 0.1  # between two looks at what there is to be told [s]
+LAST_WORDS: Final = 0.3  # time for the last stop command to arrive [s]
+TELL_PERIOD: Final = 0.1  # interval of printing news [s]
 _NAMESPACE = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*/?")
 EVERYWHERE: Final = "0.0.0.0", "::"
 
@@ -74,8 +74,8 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
     """Run the device until Ctrl-C or SIGTERM, then stop the robot.
 
     Raises:
-        ConfigError: profile, address, site or keys are not as they should be.
-        NetworkError: no port can be had.
+        ConfigError: profile, address, site or keys are invalid.
+        NetworkError: no port is available.
     """
     profile = load_ros_profile(options.profile or DEFAULT)
     url = WebSocketUrl(str(options.ros), "--ros")
@@ -102,7 +102,7 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
     try:
         if profile.topics.picture is not None:
             pictures = PictureService(options.host, 0, clock, tell)
-        stage = stage_of(options, scenario, network, recorder, pictures)
+        stage = make_stage(options, scenario, network, recorder, pictures)
         robot = RosRobot(stage, options.number, profile, url, options.namespace)
         if pictures is not None:
             pictures.serve(robot.agent.device.label)
@@ -117,7 +117,7 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
             try:
                 if not ending.is_asked:
                     clock.run()
-            finally:  # whatever ends this program, the robot stands
+            finally:  # the robot must stand however this program ends
                 robot.close()
                 clock.run(clock.now + LAST_WORDS)
         _say_news(recorder, writer)
@@ -129,23 +129,23 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
 
 
 def scenario_of(options: RobotOptions, profile: RosProfile) -> Scenario:
-    """Return what the robot is to the DVA's devices: site, pattern and limits.
+    """Return a scenario with the robot's site, pattern and limits.
 
     Raises:
-        ConfigError: there is no such site, or a change makes no sense.
+        ConfigError: there is no such site, or a change is invalid.
     """
     site = profile.site.model_dump(exclude_defaults=True)
     return lone_robot({"site": site, "robot": {"count": options.number}}, options.set)
 
 
-def stage_of(
+def make_stage(
     options: RobotOptions,
     scenario: Scenario,
     network: SocketNetwork,
     recorder: Recorder,
     pictures: PictureService | None,
 ) -> Stage:
-    """Return where the robot's device is made; its pictures are where `pictures` serves them."""
+    """Return the stage of the robot's device, with the pictures of `pictures`."""
 
     def join(kind: str, number: int) -> str:
         return network.join(id_of(kind, number), options.host, options.listen)

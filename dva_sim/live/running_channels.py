@@ -1,4 +1,4 @@
-"""The channels of a recording for a run that goes on, from the lines that its parts write."""
+"""The channels of a recording during a run, from the lines that its parts write."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.agents.observation import CameraFrame
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
 from dva_sim.kernel.streams import Streams
-from dva_sim.live.judging import SENT_LINE, observation_of
+from dva_sim.live.judging import SENT_LINE, read_observation
 from dva_sim.protocol.facts import Fact
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels
@@ -20,15 +20,15 @@ from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import Scenario, site_of
 
-MAX_SENT: Final = 4000  # commands whose time of sending is remembered
-HAZARD_S: Final = 1.0  # between two looks at the hazards, in the time of the run [s]
+MAX_SENT: Final = 4000  # maximum commands whose sending time is remembered
+HAZARD_S: Final = 1.0  # interval between two messages on hazards, in virtual time [s]
 _NUMBER = re.compile(r"<MessageID>(\d{1,10})</MessageID>")
 
 Line = list[Any]
 
 
 class RunningChannels:
-    """Turns lines into messages, one after the other; see `RunLines` for the lines.
+    """Converts lines to messages, one by one; see `RunLines` for the lines.
 
     Args:
         seed: Random seed.
@@ -55,7 +55,7 @@ class RunningChannels:
         return [self._labels[robot] for robot in self._radii if robot in self._labels]
 
     def standing(self) -> Iterator[ChannelMessage]:
-        """Yield what a late viewer has to know: the site, and everybody on it."""
+        """Yield the present state for a late viewer: the site, and all agents on it."""
         yield channels.plan(self.site)
         by_name = {self._labels.get(robot, ""): radius for robot, radius in self._radii.items()}
         for name in self._bodies:
@@ -66,11 +66,11 @@ class RunningChannels:
 
     def take(self, line: Line) -> Iterator[ChannelMessage]:
         """Return the messages in a line; irrelevant lines have none."""
-        word, *rest = line
+        word, *values = line
         if word == SENT_LINE:
-            yield self._went(*rest)
+            yield self._went(*values)
         elif word in READ:
-            yield from getattr(self, f"_{word}")(*rest) or ()
+            yield from getattr(self, f"_{word}")(*values) or ()
 
     # --- lines by their first word -------------------------------------------------------
 
@@ -143,7 +143,7 @@ class RunningChannels:
     def _frame(
         self, when: float, robot: str, seen: Line, captured: float
     ) -> Iterator[ChannelMessage]:
-        frame = CameraFrame(observation_of(seen), captured)
+        frame = CameraFrame(read_observation(seen), captured)
         yield self._message(Sent(when, robot, DVA, self._frame_bytes, frame))
 
     def _message(self, sent: Sent) -> ChannelMessage:
@@ -152,7 +152,7 @@ class RunningChannels:
         return channels.sent_message(sent, channels.names_of(self._labels))
 
     def _seen(self, when: float, word: str, content: dict[str, Any]) -> Iterator[ChannelMessage]:
-        """Yield how long a command that a robot has accepted was on its way."""
+        """Yield the transit time of a command that a robot has accepted."""
         if word == "accepted":
             issued = self._sent.pop((content["source"], content["message_id"]), None)
             robot = self._labels.get(content["robot"], content["robot"])
@@ -174,4 +174,5 @@ class RunningChannels:
             yield channels.latency(when, robot, "picture", delay=when - captured)
 
 
+# First words of the lines that become messages; each has a method of its name.
 READ: Final = "told", "team", "at", "contains", "event", "fact", "frame", "seen", "drive", "drove"

@@ -32,18 +32,18 @@ from dva_sim.simulation.scenario import Scenario
 if TYPE_CHECKING:
     from dva_sim.live.foxglove_server import FoxgloveServer
 
-SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
-SETTLED_FOR = 3.0  # all parts settled for so long: the run is over [s]
-LOOK = 0.5  # between looks at whether all parts are still there [s]
+SPEAK_WITHIN = 60.0  # maximum time to the first report of a part and between two [s]
+SETTLED_FOR = 3.0  # time without activity of any part that ends the run [s]
+LOOK = 0.5  # interval of checks whether all parts are alive [s]
 
 
 @dataclass
 class _Part:
-    """A part that runs: its process, and what it said last.
+    """A running part: its process and its last report.
 
     Attributes:
-        may_die: True for a DVA that others take the place of.
-        is_dead: True once such a one has ended by itself.
+        may_die: True for a DVA that other DVAs can replace.
+        is_dead: True once such a DVA has ended by itself.
     """
 
     child: Child
@@ -60,10 +60,10 @@ class Summary:
 
     Attributes:
         why: `settled`, `the script is done`, `time is up` or `interrupted`.
-        latest: The last report of each part, by its name.
-        lost: Recording that was lost, in one line; None: nothing.
+        latest: Last report of each part, by its name.
+        lost: Line on lost recordings; None if nothing was lost.
         verdicts: Verdicts on the safety rules.
-        link: The packets of the emulated link, if there was one.
+        link: Packet counts of the emulated link, if there was one.
     """
 
     why: str
@@ -79,8 +79,8 @@ class Supervisor:
     Args:
         options: Scenario and other options.
         hear: Callback for each report of each part.
-        rosbridge: Port for clients of ROS; None: there is none.
-        foxglove: Server that shows the run; None: there is none.
+        rosbridge: Port for clients of ROS, if any.
+        foxglove: Server that shows the run in Foxglove, if any.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Supervisor:
         self._packets: LinkReport | None = None
 
     def run(self) -> Summary:
-        """Start everything, wait for the end, end everything.
+        """Start all parts, wait for the end of the run, and end all parts.
 
         Raises:
             ChildFailed: a part could not start, or ended by itself.
@@ -138,7 +138,7 @@ class Supervisor:
                     self._link.close()
 
     def _start_all(self, scenario: Scenario) -> None:
-        """Start all parts, each of which needs the address of the one before: the DVA's."""
+        """Start all parts, the DVA first, as the others need its address."""
         if self._options.link:
             self._link = LinkProcess(scenario.link, self._options.seed)
             self._link.begin()
@@ -153,7 +153,7 @@ class Supervisor:
                 self._start(ROSBRIDGE, ROSBRIDGE, address)
 
     def _start_dvas(self, scenario: Scenario, dva: str | None) -> str | None:
-        """Start the DVA, or that of each region; return where they listen, with commas between."""
+        """Start the DVAs, one per region; return their addresses, separated by commas."""
         first = self._options.port
         regions = scenario.dva.regions
         if not regions:
@@ -166,11 +166,11 @@ class Supervisor:
             self._start(f"dva-{name}", "dva", dva, number)
             self._parts[-1].may_die = True
             while not self._interrupted and self._parts[-1].latest is None:
-                self._listen()  # so that their addresses are told in order
+                self._listen()  # so that their addresses are reported in order
         return None if self._interrupted else dva
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
-        """Start a part; it ends when its standard input does, whatever happens to us."""
+        """Start a part, which ends with its standard input even if this process is killed."""
         assert self._keeping is not None
         outlet = self._keeping.inlet()
         door = self._rosbridge.passed() if self._rosbridge and part == ROSBRIDGE else ()
@@ -199,7 +199,7 @@ class Supervisor:
         door: tuple[int, ...],
     ) -> str:
         values = {**vars(self._options), "dva": dva, "port": port}
-        values |= {"set": changes_of(self._options), "link": ()}  # files are read here alone
+        values |= {"set": changes_of(self._options), "link": ()}  # files are read only here
         values["shows_run"] = self._foxglove is not None
         if self._link is not None:
             values["host"] = ADDRESSES[_end_of(part)]
@@ -215,7 +215,7 @@ class Supervisor:
         return json.dumps(about | {"options": values})
 
     def _address_of_dva(self) -> str | None:
-        """Return the DVA's address once it listens; None if the user ends the run before."""
+        """Wait for the DVA's address; return None if the user ends the run before."""
         while not self._interrupted:
             self._listen()
             latest = self._parts[0].latest
@@ -233,7 +233,7 @@ class Supervisor:
         return "interrupted"
 
     def _some_are_done(self) -> bool:
-        """Return True if a part has ended normally: its time is up, and so is that of the run."""
+        """Return True if a part has ended normally, since the time of the run is up."""
         return any(part.child.poll() == 0 for part in self._parts)
 
     def _all_settled(self) -> bool:
@@ -246,12 +246,12 @@ class Supervisor:
         return time.monotonic() - self._settled_since > SETTLED_FOR
 
     def _listen(self) -> None:
-        """Read what the parts say, for a moment at most.
+        """Read reports of the parts, waiting at most for `LOOK`.
 
         Raises:
-            ChildFailed: one of them is gone.
-            LinkEnded: the emulated link is gone.
-            DvaSimError: what one of them was given is not as it should be.
+            ChildFailed: a part has ended unexpectedly.
+            LinkEnded: the emulated link has ended unexpectedly.
+            DvaSimError: a part has rejected its options.
         """
         self._read(LOOK)
         self._tell_broken_rules()
@@ -265,13 +265,13 @@ class Supervisor:
                 raise ChildFailed(f"{part.child.name} has said nothing for {SPEAK_WITHIN:g} s")
 
     def _bury(self, part: _Part) -> None:
-        """Go on without a DVA that has ended, as long as another one is there.
+        """Continue without a DVA that has ended, as long as another one runs.
 
         Raises:
             ChildFailed: another part has ended, or all DVAs have.
         """
-        others = [other for other in self._parts if other.may_die and other is not part]
-        if not part.may_die or all(other.is_dead for other in others):
+        dvas = [dva for dva in self._parts if dva.may_die and dva is not part]
+        if not part.may_die or all(dva.is_dead for dva in dvas):
             raise part.child.failure()
         if not part.is_dead:
             part.is_dead = True
@@ -279,12 +279,12 @@ class Supervisor:
             self._tell("dva", [[now, part.child.name, "has ended; the others go on", "link"]])
 
     def _tell_broken_rules(self) -> None:
-        """Report the rules that were found broken since the last look."""
+        """Report new breaches of safety rules."""
         moments = [list(moment) for moment in self._keeping.news()] if self._keeping else []
         self._tell("rules", moments)
 
     def _tell(self, part: str, story: list[list[Any]]) -> None:
-        """Report lines of the timeline that no part has told."""
+        """Report lines of the timeline that come from the supervisor itself."""
         if story:
             now = time.monotonic() - self._epoch
             self._hear(
@@ -304,7 +304,7 @@ class Supervisor:
             )
 
     def _read(self, wait: float) -> bool:
-        """Take what is there within a moment [s]; whether there was anything."""
+        """Read available data, waiting up to `wait` [s]; return False if there was none."""
         ready = self._selector.select(wait)
         for key, _ in ready:
             if isinstance(key.fileobj, socket.socket):
@@ -323,7 +323,7 @@ class Supervisor:
             self._selector.unregister(part.reports)
 
     def _end_all(self) -> None:
-        """Ask all parts to end, operators first, and make sure that they have."""
+        """End all parts, operators first."""
         end_all([part.child for part in reversed(self._parts)], meanwhile=self._read)
         while self._read(0.0):
             pass
@@ -333,29 +333,29 @@ class Supervisor:
 
 
 def free_pairs(count: int) -> list[int]:
-    """Return the first port of each of `count` pairs that are free now."""
-    taken: list[socket.socket] = []
+    """Return the first ports of `count` pairs of free ports."""
+    sockets: list[socket.socket] = []
     pairs: list[int] = []
     try:
         while len(pairs) < count:
-            taken.append(socket.create_server(("", 0)))
-            port = taken[-1].getsockname()[1]
+            sockets.append(socket.create_server(("", 0)))
+            port = sockets[-1].getsockname()[1]
             with suppress(OSError):
-                taken.append(socket.create_server(("", port + 1)))
+                sockets.append(socket.create_server(("", port + 1)))
                 pairs.append(port)
     finally:
-        for each in taken:
+        for each in sockets:
             each.close()
     return pairs
 
 
 def _end_of(part: str) -> str:
-    """Return the end of an emulated link that a part is at: its robots are at the far one."""
+    """Return the end of an emulated link at which a part runs; robots are at the far end."""
     return FAR if part == "world" else NEAR
 
 
 def _ports(first: int, scenario: Scenario) -> Iterator[int]:
-    """First ports of the world and of each operator, behind the DVAs'; 0 for free ones."""
+    """Yield the first ports of the world and of each operator, after the DVAs'; 0 for any."""
     in_world = scenario.robot.count + scenario.guard.count + len(scenario.events)
     dvas = max(1, len(scenario.dva.regions))
     devices = dvas

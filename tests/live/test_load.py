@@ -13,7 +13,7 @@ from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import dask_cluster
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.live.load import LoadedDva, figures_of, order_times, said
+from dva_sim.live.load import LoadedDva, figures_of, order_times, read_output
 from dva_sim.live.load_devices import LoadCounts
 from dva_sim.network.keys import KeyRing
 from dva_sim.options.runs import LoadOptions
@@ -59,7 +59,7 @@ def test_a_process_that_ends_by_itself_is_told_with_its_last_words():
     child = Child("load process 0", [sys.executable, "-c", script], stdout=subprocess.PIPE)
     try:
         with pytest.raises(DvaSimError, match="load process 0 has ended by itself: no more files"):
-            said(child)
+            read_output(child)
     finally:
         end_all([child])
 
