@@ -8,10 +8,10 @@ from itertools import groupby
 
 from dva_sim.agents.operator.published import (
     blind_lines,
-    lines_of,
     load_history,
     load_split,
     load_targets,
+    target_lines,
 )
 from dva_sim.validation.evidence import (
     SUBJECTS,
@@ -80,7 +80,7 @@ def _comparisons() -> Iterator[str]:
     """Yield what earlier comparisons of the operators were, and how many lines held in each."""
     split = load_split()
     history = load_history()
-    lines = lines_of(load_targets(), split)
+    lines = target_lines(load_targets(), split)
     blind = blind_lines(lines, split, history)
     rows = []
     for name, comparison in split.comparisons.items():

@@ -58,8 +58,8 @@ class AgentDevice:
     """An agent's share in the system.
 
     Attributes:
-        id_tag: Its id on the wire.
-        label: Its name for people, as in `robot-1`.
+        id_tag: Id on the wire.
+        label: Name for people, such as `robot-1`.
         device_type: Type in its registration.
         address: Address in its registration.
         dva: Id of the DVA that it is registered with, and obeys.
@@ -67,7 +67,7 @@ class AgentDevice:
         network: Transport of the messages.
         clock: The run's clock.
         recorder: Recorder of the run.
-        frame: Between longitude/latitude on the wire and metres inside.
+        frame: Conversion between longitude/latitude on the wire and metres inside.
         timeout: Time-out of a request on the acknowledged channel [s].
         attempts: Number of attempts of such a request.
         labels: Names of all devices by id, for the timeline.
@@ -75,9 +75,9 @@ class AgentDevice:
         silent: True if it sends nothing at all, for lack of power.
         withdrawn: True if it publishes nothing and lets its registration lapse, so that the DVA
             counts it as silent and sends nobody to it; it still replies.
-        meanwhile: Description of what it does while the DVA is silent.
+        meanwhile: Description of its behaviour while the DVA is silent.
         other_id: Description of how to give it another id, if its own is in use.
-        dva_address: Address at which it looks for the DVA; empty if people need not know it.
+        dva_address: Address of the DVA for messages to people; empty if they need not know it.
         dva_watch: Watch on the DVA's heartbeats.
         on_dva: Callback for another DVA, by id, that the device obeys from then on, and for
             its own one when that was started again.
@@ -108,14 +108,14 @@ class AgentDevice:
     is_engaged: Callable[[], bool] = lambda: False
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
-    _refusal: str = ""  # why it was not registered, as was told last
-    _life: int = 0  # what repeats itself belongs to one, and ends with it
+    _refusal: str = ""  # last reported reason of a refused registration
+    _life: int = 0  # number of restarts; repeated actions end with their life
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _addresses: dict[str, str] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
     _dva_beats: Subscription | None = None
-    _turns: bool = False  # asks another DVA to register it
+    _turns: bool = False  # a registration with another DVA is in progress
 
     def __post_init__(self) -> None:
         self.clock = self.network.clock
@@ -123,7 +123,7 @@ class AgentDevice:
         self.labels[self.id_tag] = self.label
 
     def call(self, label: str) -> None:
-        """Give it another label, which can be told apart from those of all others here."""
+        """Change the label, which must be distinguishable from all others here."""
         others = [
             label_there for id_tag, label_there in self.labels.items() if id_tag != self.id_tag
         ]
@@ -154,7 +154,7 @@ class AgentDevice:
         self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
 
     def look_for_dva_at(self, address: str) -> None:
-        """Name an address when telling of the DVA, and tell soon if nobody answers there."""
+        """Name an address in messages about the DVA, and report soon if nobody answers there."""
         self.dva_address = address
         self.clock.call_after(FIRST_WORD, self._expect_dva)
 
@@ -192,7 +192,7 @@ class AgentDevice:
         self.dva_watch = DvaWatch()
 
     def crash(self) -> None:
-        """Be gone without a word: what was asked is never asked again, nor its answer heard."""
+        """Vanish silently: open requests are not repeated, and their replies are ignored."""
         self.leave()
         for requester in self._requesters.values():
             requester.close()
@@ -252,7 +252,7 @@ class AgentDevice:
         self.ask(dva, self._registration, answered, failed)
 
     def _obey(self, dva: str) -> None:
-        """Belong to another DVA; what the last one was asked has failed."""
+        """Change to another DVA; open requests to the previous one fail."""
         before = self.dva
         self.dva = dva
         self.dva_watch = DvaWatch()
@@ -268,7 +268,7 @@ class AgentDevice:
         self.give_up(before)
 
     def _handed_over(self, message: m.Message, body: m.HandOver) -> m.Reply:
-        """Turn to another DVA, if the own one asks for that, and nothing holds the device back."""
+        """Change to another DVA if the present one requests it and the device is free to."""
         number = message.message_id
         if message.source != self.dva:
             return m.Reply(number, m.NOT_PERMITTED, "only the DVA hands its devices over")
@@ -282,7 +282,7 @@ class AgentDevice:
         return m.Reply(number, m.OK, "")
 
     def why_refused(self, reply: m.Reply) -> str:
-        """Return why it was not registered, and what people can do about it."""
+        """Return the reason of a refused registration, and a remedy."""
         advice = self.other_id if reply.code == m.BUSY else ""
         return f"{reply.text}; {advice}" if advice else reply.text
 
@@ -315,12 +315,12 @@ class AgentDevice:
                 self.dva_watch.answered(self.clock.now)
                 self._look_for_dva()
             if reply is None:
-                on_failure()  # what was asked may have been done, but nobody can tell
+                on_failure()  # whether the request was executed is unknown
             else:
                 self._meet(peer, reply)
                 on_reply(reply)
             if reply is not None and reply.code == m.NOT_REGISTERED and peer == self.dva:
-                self.ask(peer, self._registration)  # the next request will be heard
+                self.ask(peer, self._registration)  # before the next request, which it needs
 
         def failed() -> None:
             if peer == self.dva:
@@ -345,26 +345,26 @@ class AgentDevice:
             self._requester(peer, urgent).open()
 
     def be_patient(self, timeout: float) -> None:
-        """Wait so long for each answer from now on [s]."""
+        """Set the time-out of requests from now on [s]."""
         self.timeout = timeout
         for requester in self._requesters.values():
             requester.timeout = timeout
 
     def give_up(self, peer: str) -> None:
-        """Treat whatever a peer was asked as failed."""
+        """Treat all open requests to a peer as failed."""
         for key in [(peer, False), (peer, True)]:
             requester = self._requesters.pop(key, None)
             if requester is not None:
                 requester.give_up()
 
     def forget(self, peer: str) -> None:
-        """Forget a peer that has gone: its open requests fail."""
+        """Forget a peer that has left; open requests to it fail."""
         self.give_up(peer)
         self._addresses.pop(peer, None)
         self.network.forget(peer)
 
     def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
-        """Return the reply in `data`, if it is one, from the device asked, to this very request."""
+        """Return the reply in `data`; None unless it is the peer's reply to this request."""
         answer = self.read(data, message.destination)
         if answer is None or not isinstance(answer.body, m.Reply):
             return None
@@ -374,13 +374,13 @@ class AgentDevice:
         return answer.body
 
     def _meet(self, peer: str, reply: m.Reply) -> None:
-        """Introduce the devices that the DVA lets this one act on, or be acted on by."""
+        """Introduce the devices in a permission of the DVA, in either role."""
         content = reply.content
         if peer == self.dva and isinstance(content, m.Permission) and content.address is not None:
             self.introduce(content.device, content.address)
 
     def introduce(self, peer: str, address: str) -> None:
-        """Say where a peer is found; what it was asked elsewhere, it is asked there again."""
+        """Set the address of a peer; requests that are open elsewhere are repeated there."""
         before = self._addresses.get(peer, address)
         self._addresses[peer] = address
         self.network.introduce(peer, address)
@@ -390,11 +390,11 @@ class AgentDevice:
                     requester.renew()
 
     def serve(self, handler: Handler) -> None:
-        """Let `handler` take the requests on the acknowledged channel."""
+        """Set the handler of requests on the acknowledged channel."""
         self.network.serve(self.id_tag, lambda request: self.take(request, handler))
 
     def take(self, request: Request, handler: Handler) -> None:
-        """Answer a request: by what was answered before, by a refusal, or by `handler`."""
+        """Answer a request: a copy by the earlier reply, others by a refusal or `handler`."""
         reply = self._replies.get(key_of(request.sender, request.data))
         message = self.admit(request) if reply is None else None
         if reply is not None:
@@ -432,7 +432,7 @@ class AgentDevice:
         return message
 
     def turn_away(self, request: Request, message: m.Message | None, refusal: m.Reply) -> None:
-        """Refuse a message, read or not, as it arrives; told as long as that is not too often."""
+        """Refuse a message on arrival, even an unreadable one; report it unless too often."""
         now = self.clock.now
         hearing = self._nuisances.hearing(request.peer, now)
         self._nuisances.bad(request.peer, now)
@@ -452,7 +452,7 @@ class AgentDevice:
         *,
         at_once: bool = False,
     ) -> None:
-        """Let `handler` take a message that was admitted, once, and answer it.
+        """Handle an admitted message once, by `handler`, and answer it.
 
         Args:
             request: Request that carried the message.
@@ -475,7 +475,7 @@ class AgentDevice:
             if body.code != m.OK:
                 self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
             reply = self.reply(message, body)
-            # An emergency acts whenever it comes: a button whose bytes never change must not fail.
+            # Repeated emergencies act, too: a button may always send the same bytes.
             if not urgent(message):
                 self._replies.put(key, message.source, reply)
         request.answer(reply)
@@ -491,7 +491,7 @@ class AgentDevice:
         return m.Reply(message.message_id, m.NOT_PERMITTED, f"this is the key of {sender}")
 
     def _misdirection(self, message: m.Message) -> m.Reply | None:
-        """Return the refusal of a message to another device; anybody's emergency is everybody's."""
+        """Return the refusal of a message for another device; emergencies are obeyed anyway."""
         if message.destination == self.id_tag or urgent(message):
             return None
         return m.Reply(message.message_id, m.UNKNOWN_DEVICE, f"this is {self.id_tag}")
@@ -531,12 +531,12 @@ class AgentDevice:
         on_reply: Callable[[m.Reply], object] = do_nothing,
         on_failure: Callable[[], object] = do_nothing,
     ) -> None:
-        """Report a finding to the DVA; again while it is busy, since it has not kept that yet.
+        """Report a finding to the DVA, and repeat it while the DVA is too busy to record it.
 
         Args:
             body: The finding.
             on_reply: Callback for the first reply.
-            on_failure: Called if there is none.
+            on_failure: Called if no reply arrives.
         """
         life = self._life
 
@@ -552,7 +552,7 @@ class AgentDevice:
         self.ask(self.dva, m.OrderProgress(event_id, state))
 
     def publish(self, topic: str, body: m.Body, to: str | None = None) -> None:
-        """Publish a message to all subscribers; its header names the DVA, or who it is for."""
+        """Publish a message to all subscribers; its header names the DVA or another receiver."""
         if self.silent or self.withdrawn:
             return
         data = encode(self.outbox.message(to or self.dva, body, self.clock.now))
@@ -586,7 +586,7 @@ class AgentDevice:
         if message is None or not isinstance(message.body, m.Heartbeat):
             return
         is_restarted = self.dva_watch.beat(self.clock.now, message.message_id)
-        if is_restarted and len(self.dvas) > 1:  # it may have forgotten who holds what
+        if is_restarted and len(self.dvas) > 1:  # it may have forgotten all permissions
             self.ask(self.dva, self._registration, lambda _: self.on_dva(message.source))
         self._look_for_dva()
 
@@ -610,7 +610,7 @@ class AgentDevice:
 
     @property
     def dva_alert(self) -> str:
-        """The alert for a person while the DVA is silent; empty while it is there."""
+        """Alert for a person while the DVA is silent; empty otherwise."""
         watch = self.dva_watch
         if not watch.silent:
             return ""

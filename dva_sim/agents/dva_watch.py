@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SILENT_AFTER = 10.0  # design: silence after which the DVA counts as gone, as for devices [s]
+SILENT_AFTER = 10.0  # design: silence after which the DVA counts as absent, as for devices [s]
 
 
 @dataclass(slots=True)
@@ -20,7 +20,7 @@ class DvaWatch:
 
     Attributes:
         heard: Time of the DVA's latest message [s]; None: never.
-        beats: True once a heartbeat of it has come.
+        beats: True once a heartbeat of the DVA has arrived.
         number: Number of the latest heartbeat.
         unanswered: True while the newest request has failed.
         silent: True if it was silent at the last look.
@@ -57,5 +57,5 @@ class DvaWatch:
         return self.silent != before
 
     def silence(self, now: float) -> float:
-        """Return the time since the newest word [s]; since the start if none has come."""
+        """Return the time since the latest message [s], or since the start without any."""
         return now - (self.heard or 0.0)

@@ -1,6 +1,6 @@
 """Habits: every number about people that was assumed, with its band and the reason for it.
 
-Nobody has measured these. A scenario sets one by its key, such as
+These numbers are assumed. A scenario sets one by its key, such as
 `operator.habits.waiting.shortest_s`, a study varies it as a factor, and `dva-sim assumed` lists
 all of them. Numbers with a source, and choices of the program itself (limits of memory,
 resolutions), stay beside the code that needs them and say so.
@@ -54,9 +54,9 @@ class WaitingHabits(Sparse):
     Attributes:
         settled_s: Time for which the picture must stand still.
         still_share: Share of a move's pace below which the picture counts as still.
-        shortest_s: Shortest part of a move; a shorter way is driven more slowly instead.
+        shortest_s: Minimum duration of a move; a shorter distance is driven more slowly instead.
         patience: Multiple of the usual wait after which it moves again, though it saw nothing.
-        off_way_m: Distance from its way that it accepts after a move.
+        off_way_m: Accepted distance from its path after a move.
         faces_rad: Bearing within which it drives without turning first.
         least_m: Shortest move worth a wait.
         let_go: Pace, as a share of the limits, that it takes the robot to have had when it changes
@@ -114,14 +114,14 @@ class AimingHabits(Sparse):
         per_bit_s: Time more for each bit of its difficulty.
         close_enough: Share of the tolerance within which nothing is corrected.
         careful: Share of the tolerance within which it must expect to be before it presses.
-        finest_m: Tolerance below which nobody aims more finely.
-        misses: Standard deviation of where a movement ends, as a share of its way.
-        doubt: Usual miss of a movement that is not seen yet, as a share of its way.
+        finest_m: Lower limit of the tolerance with which a person aims.
+        misses: Standard deviation of the end of a movement, as a share of its length.
+        doubt: Expected miss of a movement that is not visible yet, as a share of its length.
         settles: Time from the end of a movement to a press, in time constants of the hand.
         ruffled: Share by which each movement that failed makes the delay feel longer.
         misjudges: Standard deviation of the judged delay, as a share of it.
         recalls_s: Time in which such a misjudgement changes.
-        practice: Power of the number of the trial by which a person becomes quicker.
+        practice: Exponent of the speed-up with the number of the trial.
     """
 
     shortest_s: Annotated[float, Assumed(0.05, 0.3, "from a flick to a refractory time")] = 0.08
@@ -150,10 +150,10 @@ class DelayHabits(Sparse):
     Attributes:
         first_guess_s: Delay that it expects before having seen any.
         usual_s: Delay of the machines that it uses every day.
-        remembers_s: Time for which it remembers what it did.
+        remembers_s: Time for which it remembers its own commands.
         fades_in_s: Time in which evidence loses its weight by a factor of e.
         firmness: Misfit that stands against each second of change [1/s].
-        most_misfit: Highest misfit of one look.
+        most_misfit: Maximum misfit of one look.
         speed_scale_mps: Difference of speeds that counts one.
         turn_scale_rad_s: Difference of turn rates that counts one.
         noticed: Share of the limits by which a motion must change to be noticed.
@@ -189,10 +189,11 @@ class CloseQuarterHabits(Sparse):
         turns_until_rad: Bearing at which it drives on.
         slowly: Share of the top speed.
         crawl_mps: Lowest speed.
-        understood_after_s: Time of being held back, beside two delays, until it understands.
-        step_out_m: Distance that it goes to where there is room.
-        clear_m: Way after which it drives as before.
-        asked_mps: Speed asked for from which on it expects to move.
+        understood_after_s: Time of being held back, in addition to two delays, until it
+            understands.
+        step_out_m: Distance that it moves to a place with room.
+        clear_m: Distance after which it drives as before.
+        asked_mps: Commanded speed above which it expects to move.
         held_still_mps: Speed seen below which it is held back.
     """
 
@@ -217,14 +218,15 @@ class StuckHabits(Sparse):
 
     Attributes:
         still: Speed [m/s] and turn rate [rad/s] below which a robot stands.
-        asked_mps: Speed asked for from which on it expects to see motion.
-        asked_rad_s: Turn rate asked for from which on it does.
-        plans_after_s: Time of standing, beside two delays, after which it plans another way.
+        asked_mps: Commanded speed above which it expects to see motion.
+        asked_rad_s: Commanded turn rate above which it expects to see motion.
+        plans_after_s: Time of standing, in addition to two delays, after which it plans another
+            path.
         asked_for_s: Time for which motion must have been asked for in all; less is a touch that
             may well have no effect.
         lets_go_s: Time for which it levels the phone before it tries again.
         nearer_m: Way below which it has made no progress.
-        in_smoke_m: Distance from which it looks at a place that it cannot see from farther.
+        in_smoke_m: Distance from which it looks at a place that smoke hides from farther away.
     """
 
     still: Annotated[float, Assumed(0.01, 0.05, "slower motion is not seen")] = 0.02
@@ -245,13 +247,13 @@ class LookingHabits(Sparse):
     """Becoming sure of an event from pictures of its place.
 
     Attributes:
-        half_seen_rad: Angle filled by what looks half like what it is.
+        half_seen_rad: Visual angle at which an event is half recognisable.
         hurried: Share of the criterion that is enough in a hurry.
         discount: Power of the contrast by which unclear evidence is discounted, beside the
             half power of its noise.
         leans_from: Share of the criterion from which on it is half convinced.
         at_place_m: Distance within which it is at the place.
-        nearer_after_s: Time without seeing the place after which it looks from nearer.
+        nearer_after_s: Time without seeing the place after which it moves closer.
         keeps_off_m: Distance from which it looks at a place.
         same_place_m: Distance from the reported place within which a hazard is the reported one.
         wait_for_picture_s: Time without a picture after which it presumes the link lost.
@@ -298,7 +300,7 @@ class AskingHabits(Sparse):
     """Waiting for a robot that is not free.
 
     Attributes:
-        again_after_s: Time until it asks once more for a robot that somebody else holds.
+        again_after_s: Time until it repeats the request for a robot that another device holds.
         stands_after_s: Time after a stop when it takes a robot to stand.
         mission_every_s: Time between two questions how a mission stands.
     """
@@ -313,7 +315,7 @@ class AskingHabits(Sparse):
 
 
 class OperatorHabits(Sparse):
-    """All assumed habits of an operator, by what they are about."""
+    """All assumed habits of an operator, by subject."""
 
     steering: SteeringHabits = Field(default_factory=SteeringHabits)
     waiting: WaitingHabits = Field(default_factory=WaitingHabits)
@@ -337,26 +339,26 @@ class WalkingHabits(Sparse):
         radius_m: Radius of the disc that stands for a person, seen from above.
         sideways_m: Half the depth of a chest, of a person who squeezes through a gap.
         reach_m: Distance within which others count, indoors.
-        berth_m: Gap kept to other bodies where there is room.
+        berth_m: Gap kept to other bodies, if there is room.
         keeps_right_m2: Handicap of passing on the left, against the square of the miss.
-        look_ahead_m: Look-ahead on the way.
+        look_ahead_m: Look-ahead on the path.
         look_past_m: Look-ahead where others are and no wall stands between.
-        astray_m: Distance from the way beyond which it plans another.
-        arrived_m: Distance from the end within which it is there.
+        astray_m: Distance from the path beyond which it plans another.
+        arrived_m: Distance from the end of the path that counts as arrived.
         crowded_m: Arrival distance where others keep it from coming nearer.
-        braking_s: Time by which the way left is divided, for the highest speed before the end.
+        braking_s: Divisor of the remaining distance that gives the maximum speed before the end.
         nearer_m: Way below which it has made no progress.
         tired_s: Time without progress after which it looks for a way around.
         gives_up_s: Time without progress after which it gives up.
         beside_m: Gap to a robot within which it squeezes past.
         sideways_mps: Speed of squeezing past.
-        standing_mps: Speed below which somebody stands in the way.
-        narrow_m: Width of a door beyond which nobody gives way.
+        standing_mps: Speed below which a person counts as standing in the way.
+        narrow_m: Width of a door beyond which people do not give way.
         gives_way_from_m: Distance before a door from which on it can wait.
         gives_way_to_m: Distance before a door up to which it still can.
         waits_before_m: Distance before the door at which it waits.
         waits_aside_m: Distance from the way through the door at which it waits.
-        oncoming_mps: Speed from which on somebody comes towards it.
+        oncoming_mps: Speed above which a person counts as approaching.
         in_door_m: Distance from its middle within which a robot is in a door.
         patience_s: Longest wait for people at a door.
         patience_with_robots_s: Longest wait for a robot that moves.
@@ -394,16 +396,16 @@ class LeavingHabits(Sparse):
     """Habits in leaving bad air.
 
     Attributes:
-        untenable_c: Air temperature in which nobody stays.
-        untenable_water_m: Depth of water in which nobody stays.
-        deadly_c: Air temperature through which nobody goes.
-        deadly_water_m: Depth of water through which nobody goes.
-        keeps_off_m: Distance kept to a bad place of the way.
-        close_m: Longest way through bad air that it takes to the end, if it gets no worse.
+        untenable_c: Air temperature in which people do not stay.
+        untenable_water_m: Depth of water in which people do not stay.
+        deadly_c: Air temperature that people do not walk through.
+        deadly_water_m: Depth of water that people do not walk through.
+        keeps_off_m: Distance kept to a bad place on the path.
+        close_m: Maximum remaining distance walked through bad air that gets no worse.
         through_m: Distance from the middle of an exit within which it is out.
-        chooses_again_s: Shortest time between two choices of a way.
+        chooses_again_s: Minimum time between two choices of a path.
         at_latest_s: Longest time between two choices that mended nothing.
-        looks_ahead_m: Distance along its way for which it looks for bad air.
+        looks_ahead_m: Distance along its path that it checks for bad air.
     """
 
     untenable_c: Annotated[float, Assumed(50.0, 80.0, "minutes in moist to dry air")] = 60.0
@@ -429,13 +431,13 @@ class GuardWorkHabits(Sparse):
     """A guard's work on an event.
 
     Attributes:
-        sees_from_m: Distance from which it sees what there is.
+        sees_from_m: Distance from which it recognises a hazard.
         extinguishes_from_m: Reach of a hand-held extinguisher.
         keeps_off_m: Distance that it keeps from untenable air while it shuts a valve.
         is_there_m: Distance within which it stands at a place.
         stands_off_m: Distance from an event at which it stands by.
         stands_by_s: Longest time for which it stands by without a word of the DVA.
-        looks_ahead_m: Distance along its way for which it looks for deadly air.
+        looks_ahead_m: Distance along its path that it checks for deadly air.
         in_sight_m: Distance from which it has seen enough if it is driven back.
     """
 

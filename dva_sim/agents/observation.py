@@ -1,6 +1,6 @@
 """Operators' view of the world: observations, frames, and visibility in smoke.
 
-A robot's camera makes them (`robot.field_of_view`), operators see nothing else.
+A robot's camera makes them (`robot.field_of_view`); operators see only these.
 
 References:
     T. Jin: Visibility and human behavior in fire smoke. SFPE Handbook of Fire Protection
@@ -24,7 +24,7 @@ IN_VIEW = "in view"  # end of a robot's finding while it inspects a place
 CLEAR = 1000.0  # design: visibility without smoke [m]
 SEEN_THROUGH = 3.0
 """Source: Jin: optical depth of smoke through which what does not shine is still made out. Smoke
-hides no fire: who sees it has found one."""
+itself counts as a sign of fire, so it never hides one."""
 
 
 class SeenHazard(NamedTuple):
@@ -34,7 +34,7 @@ class SeenHazard(NamedTuple):
         kind: `fire`, `gas_leak` or `flood`.
         x: Position to the east, judged from the picture and the map [m].
         y: Position to the north [m].
-        distance: From the camera [m].
+        distance: Distance from the camera [m].
         angle: Apparent size: the angle that it fills [rad].
         contrast: Share of its contrast that the smoke before it leaves.
     """
@@ -48,10 +48,10 @@ class SeenHazard(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """One frame, as far as a person makes use of it.
+    """Content of a frame that a person uses.
 
     Attributes:
-        tick: The robot's own clock when it was taken [ms]; it agrees with no other clock.
+        tick: Robot's clock at capture [ms]; not synchronised with any other clock.
         x: Position of the robot to the east, judged from the picture and the map [m].
         y: Position to the north [m].
         heading: Heading [rad].
@@ -76,9 +76,9 @@ make_observation = maker(Observation)
 
 
 class CameraFrame(NamedTuple):
-    """An observation on its way; `captured` [s] is for the recorder, not for the operator.
+    """An observation in transit; `captured` [s] is for the recorder, not for the operator.
 
-    It stands in for a picture: what a person would make of the picture is what it holds.
+    It replaces a picture by the information that a person would take from it.
     """
 
     observation: Observation
@@ -90,7 +90,7 @@ class CameraFrame(NamedTuple):
 
     @classmethod
     def unpack(cls, data: bytes) -> CameraFrame | None:
-        """Return the frame in `data`; None if there is none."""
+        """Return the frame in `data`; None if it is not one."""
         try:
             (*values, hazards, visibility), captured = json.loads(data)
             tick, *pose = (float(value) for value in values)
@@ -119,7 +119,7 @@ def _hazard(kind: object, *numbers: float) -> SeenHazard:
     """Return a hazard out of a message that may be anything.
 
     Raises:
-        ValueError: what is no finite number.
+        ValueError: a value is not a finite number.
     """
     values = [float(number) for number in numbers]
     if not math.isfinite(sum(values)):
@@ -132,7 +132,7 @@ class Cameras(NamedTuple):
 
     Attributes:
         url: Function that returns the URL of a robot's camera, by its label and address.
-        topic: On which its frames are published, by that URL; None: it shows nothing of use.
+        topic: Function from a camera's URL to the topic of its frames; None if it has none.
     """
 
     url: Callable[[str, str], str]

@@ -1,4 +1,4 @@
-"""Simulated persons: who they are does not depend on what they are asked to do.
+"""Simulated persons, whose traits do not depend on the task.
 
 References:
     D. T. McRuer, H. R. Jex: A review of quasi-linear pilot models. IEEE Trans. Human Factors in
@@ -56,7 +56,7 @@ class Population(Config):
             included.
         margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
             limit of stability.
-        motor_noise: Standard deviation of what the hand does, as a share of it.
+        motor_noise: Standard deviation of the hand's motion, as a share of it.
         pointing_rad_s: Gain of bringing a cursor to its target, however short the delay.
         sensitivity: Discrimination of an event from none per second in plain view, in standard
             deviations [1/sqrt(s)].
@@ -146,7 +146,7 @@ def with_medians(profile: P, medians: Mapping[str, float], whose: str) -> P:
     Args:
         profile: Profile whose fields are traits, or numbers that all persons share.
         medians: Medians by trait, such as `{"margin": 0.4}`.
-        whose: Part of a scenario that names them.
+        whose: Part of a scenario that defines the persons.
 
     Raises:
         ConfigError: there is no such trait, or its median is not above 0.

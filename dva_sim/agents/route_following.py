@@ -1,6 +1,6 @@
-"""Following a route: where one is on it, which way is ahead, and how to steer there.
+"""Following a route: position on it, distance and direction ahead, and steering.
 
-Robots on missions, operators who drive and people who walk stand on this.
+It is shared by robots on missions, operators who drive, and people who walk.
 
 References:
     R. C. Coulter: Implementation of the pure pursuit path tracking algorithm.
@@ -40,7 +40,7 @@ class Ahead(NamedTuple):
     Attributes:
         bearing: Direction to the look-ahead point, relative to the heading [rad].
         distance: Distance to it [m].
-        remaining: Way left on the route [m].
+        remaining: Remaining distance on the route [m].
         offset: Distance from the route [m].
     """
 
@@ -69,11 +69,11 @@ class _Place:
     """Position on a route.
 
     Attributes:
-        leg: On which piece.
-        along: The way to there [m].
-        x: Position, which may be beside the route [m].
-        y: Likewise.
-        offset: Distance from the route [m]; infinite: not looked for yet.
+        leg: Index of the piece.
+        along: Distance from the beginning of the route [m].
+        x: Position to the east, perhaps beside the route [m].
+        y: Position to the north [m].
+        offset: Distance from the route [m]; infinite if not computed yet.
     """
 
     leg: int
@@ -102,7 +102,7 @@ class _Line:
         self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]
         headings = np.arctan2([leg[3] for leg in self.legs], [leg[2] for leg in self.legs])
         turns = np.abs(np.remainder(np.diff(headings) + math.pi, 2.0 * math.pi) - math.pi)
-        self._turned: list[float] = [0.0, *np.cumsum(turns).tolist()]  # in all, up to each piece
+        self._turned: list[float] = [0.0, *np.cumsum(turns).tolist()]  # turns before each piece
         self.begin = _Place(0, 0.0, *corners[0], offset=math.inf)
         self._last: _Place | None = None
         self._found = self.begin
@@ -181,7 +181,7 @@ class Route:
 
     Attributes:
         points: Points as given.
-        length: Whole way [m].
+        length: Length of the route [m].
     """
 
     def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
@@ -219,22 +219,22 @@ class Route:
         return _make_ahead(bearing, distance, self.length - place.along, place.offset)
 
     def remaining(self, x: float, y: float) -> float:
-        """Return the way left [m] from the place on the route nearest to here, as `ahead` tells."""
+        """Return the remaining distance [m] from the position on the route, as by `ahead`."""
         return self.length - self._go_to(x, y).along
 
     def advance(self, x: float, y: float) -> None:
-        """Keep track of how far one has come who is here [m], as `ahead` does."""
+        """Update the position on the route from a position [m], as `ahead` does."""
         self._go_to(x, y)
 
     def _go_to(self, x: float, y: float) -> _Place:
-        """Return one's place on the route who is here now [m]."""
+        """Update and return the position on the route from a position [m]."""
         place = self._place
         if x != place.x or y != place.y or place.offset == math.inf:
             self._place = place = self._line.next_place(place, x, y, self._reach)
         return place
 
     def point_at(self, along: float) -> tuple[float, float]:
-        """Return the place a given way along the route [m]; beyond its end, the end."""
+        """Return the point at a distance along the route [m], or its end."""
         at = self._line.at
         legs = self._line.legs
         i = bisect_right(at, along, 0, len(legs)) - 1
@@ -278,7 +278,7 @@ class Reach:
 
     Attributes:
         speed: Largest speed [m/s].
-        turn_rate: Largest turn rate, either way [rad/s].
+        turn_rate: Maximum turn rate in either direction [rad/s].
         radius: Radius of its sharpest curve [m]; 0: it turns on the spot.
     """
 
@@ -350,7 +350,7 @@ class PurePursuit:
         self._turning = abs(ahead.bearing) > limit
         is_there = ahead.remaining < stop_before
         if is_there and reach.radius > 0.0:
-            return Intent(0.0, 0.0)  # a car cannot turn towards what it has come to see
+            return Intent(0.0, 0.0)  # a car cannot turn towards the event on the spot
         if self._turning or is_there:
             gain = gain_at(person.crossover, person.margin, delay)
             return reach.turn(self._clamp(gain * ahead.bearing))

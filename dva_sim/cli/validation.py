@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.agents.operator.strategies import try_strategy
 from dva_sim.cli.console import console, say
 from dva_sim.cli.verbosity import detail
@@ -171,7 +171,7 @@ def _length(quick: bool) -> str:
 # --- operators -------------------------------------------------------------------------
 def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> ValidationResult:
     split = load_split()
-    lines = lines_of(load_targets(), split)
+    lines = target_lines(load_targets(), split)
     persons = operators.QUICK_PERSONS if quick else operators.PERSONS
     setting = operators.OperatorsSetting(strategy or split.strategy, seed, persons, quick, workers)
     try_strategy(setting.strategy)  # whether there is one, is known before anything is played

@@ -6,7 +6,7 @@ from pathlib import Path
 from helpers.dva.queue_case import load_case
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
 
-from dva_sim.agents.operator.published import SplitFile, TargetFile, lines_of
+from dva_sim.agents.operator.published import SplitFile, TargetFile, target_lines
 from dva_sim.cli.validation import validate
 from dva_sim.kernel.config import validate as checked
 from dva_sim.network.pattern_runs import Condition
@@ -108,9 +108,9 @@ MISTAKES = [
     *mistakes(
         call,
         (lambda: split_of(fit={"a": ("T",)}, not_fitted={"b": ("T",)}).kinds(), "'T'"),
-        (lambda: lines_of(targets(low=1), split_of()), "T"),
+        (lambda: target_lines(targets(low=1), split_of()), "T"),
         (
-            lambda: lines_of(targets("V,M", low=1), split_of(not_fitted={"a": ("T",)})),
+            lambda: target_lines(targets("V,M", low=1), split_of(not_fitted={"a": ("T",)})),
             "T not-fitted",
         ),
         (lambda: targets("X", low=1), "'X' T V, M"),

@@ -1,4 +1,4 @@
-"""A control room: what it knows of the events, and what people there ask of the DVA.
+"""A control room: its knowledge of the events, and its requests to the DVA.
 
 All control goes by messages, as from any console: the owner of the agent sends bodies of
 `protocol/control_room.py` by `ask`; callbacks deliver the DVA's publications.
@@ -21,22 +21,22 @@ class ControlRoomAgent:
     """One control room.
 
     Args:
-        device: Its identity and ways to talk; of type `ControlRoom`.
+        device: Identity and connections of the agent; of type `ControlRoom`.
 
     Attributes:
         events: Latest published state of each event, by number.
         received_at: Time of that publication [s].
-        histories: Steps of each event, by number, as far as they were heard.
+        histories: Steps of each event, by number, as far as they were received.
         devices: Registered devices by id, from the latest list.
         dispatch: Dispatch mode and own role; None until the first publication.
-        raised: Number of the event that it has raised last, by the DVA's record of that.
+        raised: Number of the event that it raised last, from the DVA's record.
         orders: Orders for robots that it drives at its own wish, by event.
         on_event: Callback for each change of an event.
         on_list: Callback once the DVA has sent all current events.
         on_dispatch: Callback for each change of the dispatch mode.
         on_record: Callback for each decision.
         on_forgotten: Callback when the DVA does not know this room: it may have lost its memory.
-        gives_up: True if it gives up a robot that somebody else asks for.
+        gives_up: True if it gives up a robot that another device requests.
         on_message: Callback for messages of the DVA to it: a session has ended, an order is over.
     """
 
@@ -77,7 +77,7 @@ class ControlRoomAgent:
         self._listening = [device.network.subscribe(device.id_tag, dva, t, heard) for t in topics]
 
     def refresh(self) -> None:
-        """Ask for the whole list, who is there, and how orders are given, if it takes part."""
+        """Request the lists of events and devices and the order rules, if it takes part."""
         if self.device.withdrawn:
             return
         self.ask(m.GetDispatch())
@@ -90,7 +90,7 @@ class ControlRoomAgent:
         then: Callable[[m.Reply], object] = do_nothing,
         failed: Callable[[], object] = do_nothing,
     ) -> None:
-        """Send something to the DVA; what the answer holds is known before `then` is called."""
+        """Send a request to the DVA; `then` is called after the reply has been processed."""
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.NOT_REGISTERED:
@@ -101,7 +101,7 @@ class ControlRoomAgent:
         self.device.ask(self.device.dva, body, answered, failed)
 
     def _ask_above(self, number: int | None) -> None:
-        """Take one part of a list that comes in parts, by number."""
+        """Handle one part of a list that arrives in parts, ordered by number."""
 
         def more(reply: m.Reply) -> None:
             if not isinstance(reply.content, m.EventList):
@@ -113,7 +113,7 @@ class ControlRoomAgent:
 
         self.ask(m.GetEventList(number), more)
 
-    # --- what comes in -------------------------------------------------------------------
+    # --- incoming messages ------------------------------------------------------------
 
     def _on_published(self, data: bytes) -> None:
         message = self.device.read(data, self.device.dva)
@@ -129,7 +129,7 @@ class ControlRoomAgent:
                     self._note(status)
             case m.DispatchStatus():
                 before = self.dispatch
-                # What is published names no role.
+                # Published messages do not name the role.
                 role = body.role or (before.role if before else None)
                 self.dispatch = m.DispatchStatus(
                     body.dispatch_mode, body.decide_within, body.switched, role
@@ -166,7 +166,7 @@ class ControlRoomAgent:
             del self.events[number], self.received_at[number], self.histories[number]
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        """Answer a request of the DVA to a holder of robots: it has asked for nothing."""
+        """Answer a request of the DVA to holders of robots; it has requested none."""
         body = message.body
         answer = m.Reply(message.message_id, m.OK, "")
         if message.source != self.device.dva:

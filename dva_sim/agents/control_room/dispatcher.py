@@ -1,7 +1,7 @@
-"""A person who dispatches by a script, as studies want: it takes its time, and may know better.
+"""A simulated person who dispatches by a script: with delays, and sometimes against the policy.
 
-It does one thing at a time: it acknowledges an event, reads what the policy would do, decides,
-and turns to the next. What it does is said by the messages of any control room.
+The person does one thing at a time: acknowledges an event, reads the policy's advice, decides, and
+turns to the next event. All actions are messages of an ordinary control room.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Turned:
 
     Attributes:
         acknowledged: True once anybody has acknowledged it.
-        looks: Number of looks so far: each look takes a time of its own.
+        looks: Number of looks so far; the duration of each is drawn separately.
         tries: Number of decisions refused in a row.
     """
 
@@ -37,7 +37,7 @@ class Turned:
 
 
 class ScriptedDispatcher:
-    """Somebody at a control room.
+    """A simulated person at a control room.
 
     Args:
         room: Control room that it sees and acts by.
@@ -59,7 +59,7 @@ class ScriptedDispatcher:
         self._busy: int | None = None
         room.on_event = self._seen
 
-    # --- what there is to do ---------------------------------------------------------------
+    # --- choice of an event ---------------------------------------------------------------
 
     def _seen(self, status: m.EventStatus) -> None:
         number = status.event_id
@@ -71,7 +71,7 @@ class ScriptedDispatcher:
 
     @staticmethod
     def _wants_something(status: m.EventStatus, turned: Turned) -> bool:
-        """Return True for a new event, or one about which the policy asks what is undecided yet."""
+        """Return True for a new event, or one with an undecided request of the policy."""
         if status.closed_for is not None or turned.tries >= MAX_TRIES:
             return False
         return not turned.looks or status.proposed is not None
@@ -84,7 +84,7 @@ class ScriptedDispatcher:
                 self._turn_to(number)
 
     def _done(self) -> None:
-        """Turn to the next; to the same again if something has come up meanwhile."""
+        """Turn to the next event, or to the same one if it needs another decision."""
         number = self._busy
         self._busy = None
         if number is not None:
@@ -145,7 +145,7 @@ class ScriptedDispatcher:
         self._done()
 
     def _wish(self, status: m.EventStatus, proposal: m.Proposal) -> m.Body | None:
-        """Return what it wants done; None if the policy has done it, or nothing can be done."""
+        """Return the desired order; None if the policy has given it, or none is possible."""
         number = status.event_id
         decisions = status.decisions
         task = proposal.task

@@ -1,4 +1,4 @@
-"""History of an event as a control room has heard it: each step, who took it, and when."""
+"""History of an event as received by a control room: each step, its author and its time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LED_BY: Final = {
     "escalate": "escalated",
     "expire": "expired",
 }
-"""States by the decisions that lead to them: who decided says more than that it is so."""
+"""States by the decisions that lead to them: the decision also names its author."""
 
 
 class EventStep(NamedTuple):
@@ -23,8 +23,8 @@ class EventStep(NamedTuple):
     Attributes:
         time: Time [s].
         what: State as in `EventStatus`, `reported`, or a decision as in `Fact`.
-        who: Label of the person, policy or rule that decided; empty: nobody did.
-        device: Id of the device that was sent, or is there.
+        who: Label of the person, policy or rule that decided; empty if none did.
+        device: Id of the device that was sent or has arrived.
         reason: Reason or text, in words.
     """
 
@@ -76,7 +76,7 @@ class EventHistory:
         """Return the words of a decision besides its reason."""
         if record.action == "severity":
             return record.text
-        if record.action == "note":  # before version 1.9 the status alone tells of it
+        if record.action == "note":  # before version 1.9 notes are only in the status
             return record.note or (self._known and self._known.note) or ""
         task = record.task or "confirm"
         return "" if task == "confirm" else f"to {task.replace('_', ' ')}"

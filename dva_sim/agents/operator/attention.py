@@ -42,7 +42,7 @@ class Screen(Protocol):
     Attributes:
         waits_since: Time since which the robot has waited for a judgement [s]; None: it does not
             wait.
-        log: Log of the drive, which counts looks.
+        log: Log of the drive, in which looks are counted.
     """
 
     waits_since: float | None
@@ -64,11 +64,11 @@ def next_screen(
 
     Args:
         now: [s]
-        current: Place of the one that is looked at, if any is.
-        since: Time since which it has been looked at [s].
+        current: Index of the screen that is looked at, if any.
+        since: Start of the present look [s].
         waits: Time since which each robot has waited for a judgement [s]; None: it does not wait.
         seen: Time of the latest look at each [s].
-        glance: Time for which one that only drives is looked at [s].
+        glance: Duration of a look at a robot that only drives [s].
     """
     waiting = [(time, index) for index, time in enumerate(waits) if time is not None]
     if current is not None and waits[current] is not None:
@@ -82,7 +82,7 @@ def next_screen(
 
 
 class Attention:
-    """The eyes of one person.
+    """Gaze of one person.
 
     Args:
         clock: The run's clock.
@@ -106,7 +106,7 @@ class Attention:
         self._choosing = False
 
     def begin(self, screen: Screen) -> None:
-        """Add a screen; the only one is looked at at once."""
+        """Add a screen, and look at it if it is the only one."""
         self._screens.append(screen)
         self._seen.append(-math.inf)
         if self._current is None:
@@ -116,7 +116,7 @@ class Attention:
             self._clock.every(self._habits.reconsiders_s, self._reconsider)
 
     def end(self, screen: Screen) -> None:
-        """Remove a screen that goes off, and look at another, if there is one."""
+        """Remove a screen that is switched off, and look at another one, if any."""
         if screen not in self._screens:
             return
         if screen is self._current:
@@ -127,7 +127,7 @@ class Attention:
             self._turn_to(self._best())
 
     def looks_at(self, screen: Screen) -> bool:
-        """Return True if the person sees what is on a screen now."""
+        """Return True if the person is looking at a screen now."""
         return screen is self._current and self._clock.now >= self._since
 
     def _reconsider(self) -> bool:
@@ -174,7 +174,7 @@ class OperatorSetup:
     Attributes:
         pattern: Function that makes the messaging pattern of a drive, by the id of the robot.
         window: Maximum number of unanswered commands, where the pattern allows several.
-        rate_hz: Wanted commands per second.
+        rate_hz: Desired rate of commands [1/s].
         timeout: Time-out of a request [s].
         attempts: Number of attempts of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
@@ -198,14 +198,14 @@ class DriverSeat:
     """Everything a person brings to a drive, and keeps from one to the next.
 
     Args:
-        device: Identity and ways to talk.
+        device: Identity and connections of the operator.
         phone: The phone in the hand.
         strategy: Function that makes the person's strategy for a robot with these limits.
         reach: Limits of a robot, by its id.
         planner: The person knows the building.
         setup: Pattern, rate, time-outs.
         rng: Random generator of this person's judgement.
-        looks: Random generators of its looks at an event, by a name for each visit.
+        looks: Random generators for looks at an event, by the name of the visit.
 
     Attributes:
         delay: The person's estimate of the delay.
@@ -251,7 +251,7 @@ class DriverSeat:
         return self.person.reading * math.exp(OCCASIONS * next(self._readings))
 
     def noise(self, event: int) -> Iterator[float]:
-        """Return standard normal numbers for one more time at an event, whatever the pattern."""
+        """Return standard normal numbers for another visit to an event, alike for all patterns."""
         self._times[event] += 1
         return _normals(self._looks(f"{event}/{self._times[event]}"), block=64)
 

@@ -1,4 +1,4 @@
-"""The phone's app: it makes commands from the tilt, and sends them as the pattern says."""
+"""The sender of the phone's commands, by the rules of a pattern."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _make_made = maker(Made)
 
 
 class CommandSender:
-    """Looks at the phone whenever it is time, and gives the pattern what it says; see `Line`.
+    """Reads the phone's command when it is due, and passes it to the pattern; see `Line`.
 
     Args:
         device: The operator's.
@@ -37,13 +37,13 @@ class CommandSender:
         drive: Log of this drive; names the robot.
         session: Session of this drive.
         phone: Source of commands from the tilt.
-        rate_hz: Wanted commands per second.
+        rate_hz: Desired rate of commands [1/s].
         timeout: Time-out of a command that needs a reply [s].
         attempts: Number of attempts of such a command.
         window: Maximum number of such commands without a reply.
         seen_tick: The newest robot tick on the screen [ms], if there is any.
-        on_lost: Callback with the reason when nobody replies any more.
-        on_refused: Callback with the reason when nobody obeys any more.
+        on_lost: Callback with the reason when replies have ceased.
+        on_refused: Callback with the reason when all commands are refused.
         heeds: True if the app reacts to refusals.
 
     Attributes:
@@ -122,19 +122,19 @@ class CommandSender:
         if made is not None:
             self._let(self._pattern.offer, made)
             if self._phone.waits and self._pattern.in_step and self._is_asking:
-                self._phone.hold()  # until the reply: nothing is looked at meanwhile
+                self._phone.hold()  # until the reply, as the app blocks meanwhile
                 self._is_held = True
                 return
         self.clock.call_at(self._phone.next_look(now, self.rate_hz), self._look)
 
     def look_now(self) -> None:
-        """Look between two periods: what makes the commands has something new."""
+        """Read the phone between two periods, since it has a new command."""
         made = self._make() if self._on else None
         if made is not None:
             self._let(self._pattern.offer, made)
 
     def _go_on(self) -> None:
-        """Go on after a reply, or without one: an app that waited for it looks again."""
+        """Continue after a reply or a time-out; an app that waited reads the phone again."""
         if not (self._is_held and self._on) or self._is_asking:
             return
         self._is_held = False
@@ -149,7 +149,7 @@ class CommandSender:
     def _make(self) -> Made | None:
         """Return the phone's present command, if it is worth a message.
 
-        Nobody drives before the first picture: without its tick the robot could not bound
+        Commands before the first picture are not sent: without its tick the robot could not bound
         the age of a command that waits for a connection to open.
         """
         now = self.clock.now
@@ -173,16 +173,16 @@ class CommandSender:
         self.drive.commands.append((made.time, command.speed, command.turn_rate))
         return message
 
-    # --- being told no -------------------------------------------------------------------
+    # --- refusals ------------------------------------------------------------------------
 
     def _answered(self, command: Message, data: bytes) -> None:
-        """Take a reply: what it says is heard whatever the pattern makes of it."""
+        """Handle a reply: refusals are noted for any pattern."""
         reply = self._device.reply_to(command, data)
         code = None if reply is None else reply.code
         self._heed(self.refusals.answered(code, self.clock.now))
 
     def _on_holder(self, data: bytes) -> None:
-        """Hear from the robot who holds it, for those whom nobody answers."""
+        """Note the holder that the robot publishes, for patterns without replies."""
         message = self._device.read(data, self.drive.robot) if self._on else None
         if message is not None and isinstance(body := message.body, RobotHolder):
             now = self.clock.now
@@ -200,7 +200,7 @@ class CommandSender:
             self._on_refused(why)
 
     def _let(self, act: Callable[..., object], *arguments: Any) -> None:
-        """Ask the pattern; what one of a user gets wrong is counted, and the command is gone."""
+        """Call the pattern; errors of a user's pattern are counted, and the command is dropped."""
         try:
             act(*arguments)
         except FAILURES as error:
@@ -281,6 +281,6 @@ class CommandSender:
         return message.body.code if message and isinstance(message.body, Reply) else None
 
     def lost(self, why: str = "") -> None:
-        """Alert, as nobody obeys any more, and end the drive."""
+        """Alert that all commands are refused, and end the drive."""
         self.drive.alerts += 1
         self._on_lost(why or f"no answer after {self.attempts} attempts")

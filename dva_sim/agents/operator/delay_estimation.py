@@ -1,4 +1,4 @@
-"""Estimation of the delay by a person: matching what it sees to what it did."""
+"""Estimation of the delay by a person, who compares seen motion with own commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dva_sim.agents.habits import AimingHabits, DelayHabits
 Floats = NDArray[np.float64]
 
 STEP = 0.1  # design: resolution of the memory and of the guess while driving [s]
-LOOK_STEPS = 2  # design: the guess is looked at every so many steps
+LOOK_STEPS = 2  # design: number of steps between two updates of the estimate
 
 
 class DelayEstimate:
@@ -66,12 +66,12 @@ class DelayEstimate:
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
-        """Note what the person asks for from `now` [s] on: speed and turn rate, or velocities."""
+        """Note the person's command from `now` [s] on: speed and turn rate, or velocities."""
         self._remember(now)
         self._intent = one, other
 
     def see(self, now: float, one: float, other: float, over: float = 0.0) -> None:
-        """Compare the motion in the picture at `now` [s] with what was asked for.
+        """Compare the motion in the picture at `now` [s] with the commands.
 
         A motion that was summed over a time is compared with what was asked for over as long.
 
@@ -98,7 +98,7 @@ class DelayEstimate:
         fades_in = self._habits.fades_in_s
         passed = 0.0 if self._last is None else min(now - self._last, fades_in)
         self._last = now
-        if passed < 2.0 * self._period:  # frames come a little sooner or later than one looks
+        if passed < 2.0 * self._period:  # frames do not arrive exactly in step
             passed = self._period
         error *= passed
         misfit = self._misfit
@@ -107,7 +107,7 @@ class DelayEstimate:
         self.value = float(self._lags[misfit.argmin()]) + self._hand
 
     def rest(self) -> None:
-        """Pause: the time in which nothing is looked at does not count as nothing seen."""
+        """Pause: time without looking does not count as time without motion."""
         self._last = None
 
     def _past(self, steps: int) -> Floats:
@@ -139,7 +139,7 @@ class DelayEstimate:
 
 
 class PeriodEstimate:
-    """Estimate of the period at which commands get through, from when requests take effect.
+    """Estimate of the period of effective commands, from the times at which requests take effect.
 
     A change that is asked for takes effect after the delay and the time until the next command
     gets through. So times to effects differ by up to the period, a move lasts by up to a period
@@ -151,18 +151,18 @@ class PeriodEstimate:
         habits: Changes that are noticed, and how many effects are remembered.
 
     Attributes:
-        value: The period that is counted on; 0 until anything was seen of it [s].
-        likely: The period that is as likely to be shorter as longer; likewise [s].
+        value: Period that the person relies on [s]; 0 before any evidence.
+        likely: Median of the estimated period [s]; 0 before any evidence.
     """
 
-    MEMORY = 4.0  # design: what was seen fades over so many times as many effects
+    MEMORY = 4.0  # design: number of periods over which evidence fades
     SHORTEST = 0.1  # design: period that is weighed [s]
     LONGEST = 10.0  # design: period that is weighed [s]
     STEPS = 40  # design: periods that are weighed
     SURE = 0.95  # design: share of the weight below the period that is counted on
     BLURRED = 0.3  # design: times that differ by less are the same to a person [s]
-    SURPRISE = 0.02  # design: likelihood of what a period does not explain
-    EARLY = 0.5  # design: share of the delay; seen sooner, it was asked for before
+    SURPRISE = 0.02  # design: likelihood of an observation that a period does not explain
+    EARLY = 0.5  # design: share of the delay; earlier motion belongs to an earlier command
     LATE = 1.5  # design: share of the delay
 
     def __init__(self, habits: DelayHabits) -> None:
@@ -177,14 +177,14 @@ class PeriodEstimate:
         self.value = self.likely = 0.0
 
     def intend(self, now: float, one: float, other: float) -> None:
-        """Note what the person asks for from `now` [s] on, as shares of the limits."""
+        """Note the person's command from `now` [s] on, as shares of the limits."""
         for channel, speed in zip(self._channels, (one, other), strict=True):
             lost = channel.ask(now, self._delay, asks=abs(speed) >= self._habits.noticed)
             if lost > 0.0:
                 self._weigh(1.0 - np.minimum(lost / self._periods, 1.0))
 
     def see(self, now: float, one: float, other: float, delay: float) -> float:
-        """Compare the motion in the picture, as shares of the limits, with what was asked for.
+        """Compare the motion in the picture with the commands, both as shares of the limits.
 
         The period as it is taken now.
 
@@ -235,7 +235,7 @@ class PeriodEstimate:
         self._weigh((1.0 - part) * less + part * more)
 
     def _weigh(self, likelihoods: Floats) -> None:
-        """Weigh the periods by what was seen."""
+        """Update the weights of the periods by an observation."""
         self._weights *= 1.0 - 1.0 / (self.MEMORY * self._habits.effects)
         self._weights += np.log(np.maximum(likelihoods, self.SURPRISE))
         shares = np.cumsum(np.exp(self._prior + self._weights - self._weights.max()))
@@ -244,7 +244,7 @@ class PeriodEstimate:
 
 
 class _Move(NamedTuple):
-    """A motion that began at rest, and what was seen of it [s]."""
+    """A motion that began at rest, with the times at which it was seen [s]."""
 
     begun: float
     ended: float | None = None
@@ -271,7 +271,7 @@ class _Channel:
 
         Args:
             now: [s]
-            delay: After which the last move should have been seen [s].
+            delay: Delay after which the last move should be visible [s].
             asks: True if motion is requested.
         """
         lost = 0.0

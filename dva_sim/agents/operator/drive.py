@@ -37,7 +37,7 @@ from dva_sim.worlds.planning import Planner
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
-HEADINGS = 16  # design: looked at for a place with room
+HEADINGS = 16  # design: number of directions searched for room
 
 
 def roomiest(here: Point, planner: Planner, step: float) -> Point:
@@ -51,7 +51,7 @@ def roomiest(here: Point, planner: Planner, step: float) -> Point:
 
 
 class CloseQuarters:
-    """Notices that the robot is held back, and then follows a new way closely for a moment.
+    """Notices that the robot is blocked, and then follows a new path closely for a moment.
 
     Args:
         person: Gain and caution.
@@ -80,7 +80,7 @@ class CloseQuarters:
         Args:
             now: [s]
             seen: The frame, as the person judges it.
-            intended_mps: Speed that the person asks for [m/s].
+            intended_mps: Commanded speed [m/s].
             delay: Whole delay as the person perceives it [s].
         """
         here = (seen.x, seen.y)
@@ -89,9 +89,7 @@ class CloseQuarters:
             self._from = None
         if seen.speed >= habits.held_still_mps:
             self._held = 0.0
-        elif (
-            intended_mps > habits.asked_mps
-        ):  # while turning on the spot is asked for, nothing is learnt
+        elif intended_mps > habits.asked_mps:  # turning on the spot gives no evidence
             self._held += max(now - self._last_look, 0.0)
         self._last_look = now
         if self._held <= habits.understood_after_s + 2.0 * delay:
@@ -104,7 +102,7 @@ class CloseQuarters:
     def way(self, here: Point, goal: Point, planner: Planner) -> Floats | None:
         """Return the new way `(n, 2)` [m].
 
-        Who is held back again first goes to where there is room.
+        After being blocked again, the person first moves to a place with room.
         """
         via = roomiest(here, planner, self._habits.step_out_m) if self._again else here
         points = planner.path(via, goal)
@@ -161,7 +159,7 @@ class Teleoperation(Work):
         self._strategy = seat.strategy(seat.person, reach)
         self._close_quarters = CloseQuarters(seat.person, reach) if seat.setup.guarded else None
         self._stuck = seat.person.habits.stuck
-        self._asked_since: float | None = None  # to move, without any motion seen since
+        self._asked_since: float | None = None  # start of commands to move without visible motion
         self._asked_for = self._stuck_look = 0.0
         self._stuck_after = self._stuck.plans_after_s + 2.0 * seat.delay.value
         self._let_go_until = 0.0
@@ -218,7 +216,7 @@ class Teleoperation(Work):
         self._count_failures()
 
     def _make_sender(self) -> CommandSender:
-        """Return how commands travel, which the pattern decides, and nothing else."""
+        """Return the pattern's transport of commands."""
         setup = self._seat.setup
         return CommandSender(
             self._device,
@@ -257,7 +255,7 @@ class Teleoperation(Work):
             self._intend(self._steer(judged, delay, usual), judged.tick)
 
     def _count_failures(self) -> None:
-        """Count what a plug-in of a user got wrong; tell of the first time."""
+        """Count failures of a user's plug-in, and report the first one."""
         for plugged_in, whose, what in self._plugged_in:
             if plugged_in.failures != self._failures.get(whose, 0):
                 counted = self._failures.get(whose, 0)
@@ -347,7 +345,7 @@ class Teleoperation(Work):
         return self._lent
 
     def _take(self, points: NDArray[np.float64]) -> Route:
-        """Go this way `(n, 2)` [m] from now on."""
+        """Follow this path `(n, 2)` [m] from now on."""
         self._route = route = Route(points)
         self._lent = route.twin()
         return route
@@ -364,7 +362,7 @@ class Teleoperation(Work):
         return left > nearer and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
-        """Return True if the robot has stood for too long although it was asked to move.
+        """Return True if the robot has stood for too long despite commands to move.
 
         Who moves and waits asks for a while only: the time counts from the first asking, waits
         included. How long is too long is of the delay when motion was last seen, since a guess

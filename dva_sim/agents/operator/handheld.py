@@ -11,7 +11,7 @@ from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.tilt import PhoneProfile
 
 OnResult = Callable[[bool, str], object]
-"""Told whether something was done, and what there is to say of it."""
+"""Callback with success or failure of an action, and a message."""
 
 
 class Input(NamedTuple):
@@ -29,7 +29,7 @@ class Console:
 
     Attributes:
         setup: Pattern, rate, time-outs, as of simulated operators.
-        phone: Turns what a person wants into commands.
+        phone: Converter of a person's input to commands.
         reach: Limits of a robot, by its id.
     """
 
@@ -39,11 +39,11 @@ class Console:
 
 
 class Gathered:
-    """One answer made of several: all must be good, else only what failed is said.
+    """A common result of several actions: success only if all succeed, or the failures.
 
     Args:
         count: Number of expected answers.
-        on_result: Callback once all have come.
+        on_result: Callback once all results have arrived.
 
     Attributes:
         failed: Callback before `on_result`, if an answer was not good.

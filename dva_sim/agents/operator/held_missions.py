@@ -9,7 +9,7 @@ from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.handheld import OnResult
 from dva_sim.protocol import messages as m
 
-STANDS_WITHIN = 3  # design: attempts in which a robot comes to a standstill
+STANDS_WITHIN = 3  # design: maximum attempts until a robot stands
 MISSIONS = ("missions", "both")  # levels of permission
 
 
@@ -22,7 +22,7 @@ class HeldMissions:
         session: Function that returns the session of the permission.
 
     Attributes:
-        status: State of the newest mission; None: nothing was heard of one.
+        status: State of the newest mission; None if none is known.
     """
 
     def __init__(self, device: AgentDevice, robot: str, session: Callable[[], int]) -> None:
@@ -33,7 +33,7 @@ class HeldMissions:
         self._heard = device.network.subscribe(device.id_tag, robot, MISSION, self._on_status)
 
     def close(self) -> None:
-        """Hear nothing more."""
+        """End the subscription."""
         self._heard.close()
 
     def begin(self, mission: m.Body, on_result: OnResult) -> None:

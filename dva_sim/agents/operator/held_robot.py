@@ -1,6 +1,6 @@
 """A robot in the hands of a person at a console: permission, picture, and drives one by one.
 
-It takes the steps that a simulated operator takes, by the same messages; when, the person says.
+It sends the same messages as a simulated operator, at the person's request.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
-STILL_WANTED = 0.3  # design: what was wanted no longer ago holds when a drive begins [s]
+STILL_WANTED = 0.3  # design: maximum age of an input that still counts at the start of a drive [s]
 MAX_INPUTS = 4096  # design: inputs remembered until they take effect
-GRANT_WITHIN = 5.0  # design: the DVA's grant may be on its way to the robot for so long [s]
+GRANT_WITHIN = 5.0  # design: maximum transit time of the DVA's grant to the robot [s]
 MAX_PICTURES = 1024  # design: pictures whose ticks are remembered until they are drawn
 LOST_AFTER = 9.0  # design: without a word of the robot: three times its watchdog [s]
 STALE_STATUSES = 3  # design: status messages in a row, which may be older than the start of a drive
 
 
 class HeldRobot:
-    """One robot that a person asked for.
+    """One robot that a person has requested.
 
     Args:
         device: The person's.
@@ -43,7 +43,7 @@ class HeldRobot:
         tilt: Function that returns the source of commands for the next drive.
         alert: Callback with messages for the person.
         let_go: Callback once the person no longer controls the robot.
-        wanted: Predicate: True if the person controls a robot by now, by its id.
+        wanted: Predicate for a robot's id: True if the person controls it.
 
     Attributes:
         phase: Current phase.
@@ -89,7 +89,7 @@ class HeldRobot:
         self.arrived = -math.inf
         self.drawn: float | None = None
         self._drawn_tick: int | None = None
-        self._ticks: dict[int, int] = {}  # of the newest pictures, by when they were taken [ms]
+        self._ticks: dict[int, int] = {}  # ticks of the newest pictures by capture time [ms]
         self.last = Input(0, 0.0, 0.0, 0.0)
         self._tilt = tilt
         self.app = tilt()
@@ -114,13 +114,13 @@ class HeldRobot:
 
     @property
     def is_driven(self) -> bool:
-        """True if the robot has been asked to be driven, and not to stop."""
+        """True if the robot was asked to start and not to stop."""
         return self.phase in ("starting", "driving")
 
     # --- permission ----------------------------------------------------------------------
 
     def ask(self, on_result: OnResult, level: str = "teleoperation") -> None:
-        """Ask the DVA for the robot, to do with it what the level says."""
+        """Request permission for the robot from the DVA, at the set level."""
         self.level = level
 
         def answered(reply: m.Reply) -> None:
@@ -159,7 +159,7 @@ class HeldRobot:
         self._be_gone()
 
     def revoked(self, session: int) -> None:
-        """End a session that is over by the DVA's word; the robot has been told, too."""
+        """End a session that the DVA has ended, as the robot knows, too."""
         if self.phase != "gone" and session == self.session:
             self.end("gave up")
             silence = "" if self._has_answered else f"; {self._silence()}"
@@ -213,11 +213,11 @@ class HeldRobot:
 
     @property
     def _lost_after(self) -> float:
-        """Without a word for so long the link counts as lost [s]."""
+        """Silence after which the link counts as lost [s]."""
         return max(LOST_AFTER, self.device.timeout)
 
     def _unanswered(self) -> None:
-        """Time has passed since the robot was asked for its camera."""
+        """Give up waiting for the robot's camera address."""
         if self.phase != "gone" and not self._has_answered:
             self._alert(f"{self.label}: {self._silence()}")
 
@@ -234,7 +234,7 @@ class HeldRobot:
 
     @property
     def heard_at(self) -> float:
-        """Time of the newest picture or status of the robot [s]; -inf: none has come."""
+        """Time of the newest picture or status of the robot [s]; -inf if none has arrived."""
         return max(self.arrived, self._heard)
 
     def drew(self, captured_ms: int | None) -> None:
@@ -270,7 +270,7 @@ class HeldRobot:
         return None if newest == -math.inf else int(newest)
 
     def _unreachable(self) -> None:
-        """Give up on a robot that has answered no attempt; it may be asked again."""
+        """Give up on a robot after unanswered attempts; it may be requested again."""
         if self.phase != "gone":
             self._alert(f"{self.label}: {self._silence()} after {self.device.attempts} attempts")
 
@@ -379,7 +379,7 @@ class HeldRobot:
         device.clock.every(1.0, lambda: self._listen(log), start=device.clock.now + 1.0)
 
     def want(self, number: int, speed: float, turn: float) -> None:
-        """Set what the person wants from now on, as shares of what the robot can do."""
+        """Set the person's command from now on, as shares of the robot's limits."""
         now = self.device.clock.now
         reach = self._console().reach(self.robot)
         self._wished = Input(number, now, speed, turn)
@@ -390,7 +390,7 @@ class HeldRobot:
                 self._sender.look_now()
 
     def tilted(self, number: int, at: float) -> None:
-        """Take samples of the person's phone, the newest taken at a time [s]."""
+        """Handle samples of the person's phone, the newest of which was taken at a time [s]."""
         reach = self._console().reach(self.robot)
         level, turn = self.app.shown
         speed = level * SPEED_PER_LEVEL / reach.speed
@@ -410,7 +410,7 @@ class HeldRobot:
         return newest
 
     def stop(self, outcome: str = "stopped", on_result: OnResult | None = None) -> None:
-        """Stop the robot in good order; no drive that has ended goes on by itself."""
+        """Stop the robot by a regular command; an ended drive never resumes by itself."""
         if not self.is_driven:
             if on_result is not None:
                 on_result(True, f"{self.label} is not driven")
@@ -430,7 +430,7 @@ class HeldRobot:
         self.device.ask(self.robot, m.StopTeleOp(), stopped, stopped, self.session)
 
     def emergency(self, on_result: OnResult) -> None:
-        """Stop at once, by the way that waits for nothing."""
+        """Stop at once, by an emergency message, which overtakes all others."""
         self.end("emergency")
         steps.ask_emergency(self.device, self.robot, self.session, on_result)
 
@@ -443,7 +443,7 @@ class HeldRobot:
         return goes_on
 
     def _lost(self, why: str) -> None:
-        """End the drive, as nobody replies; the watchdog has stopped the robot by then, or will."""
+        """End the drive without replies; the watchdog stops the robot."""
         self.end("lost link")
         self._alert(f"{self.label}: link lost: {why}")
         self.device.ask(self.robot, m.StopTeleOp(), session=self.session)

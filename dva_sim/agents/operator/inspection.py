@@ -1,9 +1,9 @@
-"""Inspection of an event: how pictures convince an operator that it is there, or not.
+"""Inspection of an event: the evidence by which an operator confirms or refutes it.
 
-Each look at a picture says a little for or against, with noise. What speaks for it adds up; what
-speaks against it takes that away again, but not below nothing: a long time without a sight makes
-nobody harder to convince. From a level on, the criterion, the person is sure. It may be wrong:
-noise alone gets there too, the rarer the higher the criterion and the clearer the pictures.
+Each look at a picture gives a little noisy evidence for or against. What speaks for it adds up;
+what speaks against it takes that away again, but not below nothing: a long time without a sight
+makes nobody harder to convince. From a level on, the criterion, the person is sure. It may be
+wrong: noise alone gets there too, the rarer the higher the criterion and the clearer the pictures.
 
 References:
     R. Ratcliff, G. McKoon: The diffusion decision model: theory and data for two-choice decision
@@ -33,7 +33,7 @@ def clearness(angle: float, half_seen: float) -> float:
 
     Args:
         angle: [rad]
-        half_seen: Angle at which it looks half like it [rad].
+        half_seen: Visual angle at which the event is half recognisable [rad].
     """
     return float(1.0 - 2.0 ** (-angle / half_seen))
 
@@ -41,7 +41,7 @@ def clearness(angle: float, half_seen: float) -> float:
 def worth(gap: float) -> float:
     """Return the weight of the pictures of the last `gap` [s], as time of a moving picture [s].
 
-    So evidence comes as fast as fresh pictures do, up to three a second.
+    So evidence arrives at the rate of new pictures, up to three per second.
     """
     return min(gap, FIXATION_S)
 
@@ -79,7 +79,7 @@ class WeighedEvidence:
 
     @property
     def sure(self) -> bool:
-        """True if the person says that it is there."""
+        """True if the person confirms the event."""
         return self.level >= self.criterion
 
     @property
@@ -92,7 +92,7 @@ class WeighedEvidence:
 
         Args:
             duration: Effective length of the look.
-            clear: Similarity of what is seen to the event, from 0 (none) to 1.
+            clear: Similarity of the view to the event, from 0 (none) to 1.
             contrast: Share of the contrast that smoke leaves.
         """
         weight = math.sqrt(contrast)
@@ -161,7 +161,7 @@ class Looking:
         return ("confirmed", "") if self._evidence.sure else conclusion
 
     def look_away(self) -> None:
-        """Turn to something else: what is not seen counts for nothing."""
+        """Look away: no evidence accumulates meanwhile."""
         self._last = None
         self.at_place = False
 

@@ -25,7 +25,7 @@ ASK_AFTER = 1  # design: requests for one order in a drive
 AS_SEEN = {
     "lost link": "presumes the link lost",
     REFUSED: "is refused",
-}  # what a drive's end looks like to the operator
+}  # report on an order, by the end of its drive
 REDIRECTED = "redirected"
 RECALLED = "recalled"
 BY_DVA = (REDIRECTED, RECALLED)  # how a drive ends by the DVA's word
@@ -36,11 +36,11 @@ class OperatorAgent:
 
     Args:
         seat: Person and equipment.
-        kind: Way in which robots look at events: `Teleoperation`, or `Supervision` of missions.
+        kind: Control of robots at events: `Teleoperation`, or `Supervision` of missions.
         span: Maximum number of orders handled at once.
 
     Attributes:
-        works: Work under way or being wound up, by robot.
+        works: Orders in progress or being wound up, by robot.
     """
 
     def __init__(self, seat: DriverSeat, kind: type[Work] = Teleoperation, span: int = 1) -> None:
@@ -49,8 +49,8 @@ class OperatorAgent:
         self._kind = kind
         self._span = span
         self.works: dict[str, Work] = {}
-        self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
-        self._again: tuple[m.Order | None, int] = (None, 0)  # what was refused, and how often
+        self._waiting: list[tuple[float, m.Order]] = []  # arrival time [s]; oldest first
+        self._again: tuple[m.Order | None, int] = (None, 0)  # refused order, and number of refusals
         self._habits = seat.person.habits.asking
         self.device.serve(self._on_request)
 
@@ -87,7 +87,7 @@ class OperatorAgent:
         return m.Reply(message.message_id, m.OK, "")
 
     def _on_revocation(self, body: m.PermissionRevocation) -> None:
-        """Let go of a robot that is no longer ours to drive; it has been told, too.
+        """Release a robot whose permission has ended; the robot knows, too.
 
         Before the drive, that session may be over since the robot knows a higher one: ask again.
         """
@@ -111,30 +111,30 @@ class OperatorAgent:
         return times if order is work.order else 0
 
     def _gives_up(self, robot: str, asker: str) -> bool:
-        """Return True if somebody may have a robot: not while it goes, or watches, at an event."""
+        """Return True if a robot may be given away: not on its way to an event, or watching it."""
         work = self.works.get(robot)
         keeps = work is not None and not work.over and work.log.started is not None
         label = self.device.label_of(robot)
         self.device.tell(f"{'keeps' if keeps else 'gives up'} {label}: {asker} asks", "order")
         return not keeps
 
-    # --- what there is to do -----------------------------------------------------------
+    # --- orders ----------------------------------------------------------------------
 
     @property
     def _orders(self) -> list[m.Order]:
-        """Those in hand that the DVA has not taken back."""
+        """Orders in progress that the DVA has not recalled."""
         begun = [w.order for w in self.works.values() if w.log.outcome not in BY_DVA]
         return begun + [order for _, order in self._waiting]
 
     def _on_order(self, order: m.Order) -> None:
         if order in self._orders:
-            return  # the DVA says again what it has said before
+            return  # a repeated order
         self._make_room(order)
         self._waiting.append((self.device.clock.now, order))
         self._go_on()
 
     def _make_room(self, order: m.Order) -> None:
-        """Put down what a new order takes the place of, if anything."""
+        """End the order that a new one replaces, if any."""
         going_on = [w for w in self.works.values() if not w.over]
         in_hand = [(w.log.ordered, w.order) for w in going_on] + self._waiting
         same = [old for old in in_hand if old[1].device == order.device]
@@ -155,7 +155,7 @@ class OperatorAgent:
                 self._drop(order, RECALLED)
 
     def _go_on(self) -> None:
-        """Take up what waits, as far as there are hands; each robot does one thing at a time."""
+        """Start waiting orders up to the operator's capacity, one per robot."""
         most = self._kind.at_once or self._span
         for since, order in list(self._waiting):
             if len(self.works) < most and order.device not in self.works:

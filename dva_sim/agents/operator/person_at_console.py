@@ -1,4 +1,4 @@
-"""A person at a console: a device like any other operator's, whose decisions are somebody's own.
+"""A person at a console: an operator's device whose decisions a real person makes.
 
 It registers, takes orders of the DVA and says what was found; it holds one robot or two and drives
 them by the same input. It obeys revocations and requests to hand over, as simulated operators do.
@@ -18,13 +18,13 @@ from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.protocol import messages as m
 
-MAX_ROBOTS = 2  # design: that one person drives by the same input
+MAX_ROBOTS = 2  # design: maximum robots that a person drives by the same input
 DECLINED_AFTER = 30.0  # design: an order that none of the people at open pages takes [s]
-ARRIVED_WITHIN_M = 3.0  # design: so near the place of an event a robot has arrived [m]
+ARRIVED_WITHIN_M = 3.0  # design: distance from an event that counts as arrived [m]
 
 
 class PersonAgent:
-    """A seat of a console, with or without somebody in it.
+    """A seat of a console, occupied or not.
 
     Args:
         device: Device of the seat on the network.
@@ -34,7 +34,7 @@ class PersonAgent:
 
     Attributes:
         console: Equipment; a new one counts from the next drive on.
-        attended: True if the seat is taken.
+        attended: True if the seat is occupied.
         order: The newest order of the DVA, until it is settled or declined.
         robots: Robots under control, by id.
         alert: Message for the person.
@@ -69,11 +69,11 @@ class PersonAgent:
         return "waiting" if self.attended else "nobody there"
 
     def steer_by(self, tilt: Callable[[], GivenTilt | TiltSources] | None) -> None:
-        """Set what makes the commands of the next drives; None: input is entered as tilt."""
+        """Set the source of the next drives' commands; None: input is converted to tilt."""
         self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
 
     def man(self, is_manned: bool) -> None:
-        """Take part while somebody is there; otherwise the DVA counts the seat as silent."""
+        """Take part while a person is present; otherwise the DVA counts the seat as silent."""
         if is_manned and self.device.withdrawn:
             self.device.resume()
         elif not is_manned and not self.device.withdrawn:
@@ -81,7 +81,7 @@ class PersonAgent:
             if self.order is not None:
                 self._put_down("failed" if self._arrived else "declined")
 
-    # --- what the person does ------------------------------------------------------------
+    # --- actions of the person ----------------------------------------------------------
 
     def sit_down(self) -> None:
         """Let a person take the seat."""
@@ -91,7 +91,7 @@ class PersonAgent:
     def take(
         self, robots: Sequence[str], on_result: OnResult, level: str = "teleoperation"
     ) -> None:
-        """Ask for robots, with one level of permission: all of them, or none is kept."""
+        """Request robots at one level of permission; keep all of them or none."""
         free = [robot for robot in robots if robot not in self.robots]
         if len(self.robots) + len(free) > MAX_ROBOTS:
             on_result(False, f"one person drives {MAX_ROBOTS} robots at most")
@@ -127,7 +127,7 @@ class PersonAgent:
             held.ask(answers, level)
 
     def release(self, on_result: OnResult) -> None:
-        """Stop what is driven, give everything back, and leave the seat."""
+        """Stop all robots, return their permissions, and leave the seat."""
         for held in list(self.robots.values()):
             held.give_back()
         if self.order is not None:
@@ -136,11 +136,11 @@ class PersonAgent:
         on_result(True, "released")
 
     def start(self, on_result: OnResult) -> None:
-        """Begin to drive all robots in hand."""
+        """Start driving all controlled robots."""
         self._each(lambda held, each: held.start(each), on_result)
 
     def stop(self, on_result: OnResult, why: str = "") -> None:
-        """Stop all robots in hand."""
+        """Stop all controlled robots."""
         if why and any(held.is_driven for held in self.robots.values()):
             self._alert(why)
         self._each(lambda held, each: held.stop("stopped", each), on_result)
@@ -156,7 +156,7 @@ class PersonAgent:
                 held.emergency(answers)
 
     def ended_by_others(self, robots: Sequence[str]) -> None:
-        """Note an emergency that somebody else at this console sends these robots."""
+        """Note an emergency stop of these robots by another person at this console."""
         for robot in robots:
             held = self.robots.get(robot)
             if held is not None and held.is_driven:
@@ -164,12 +164,12 @@ class PersonAgent:
                 self._alert(f"{held.label}: somebody has pressed the emergency stop")
 
     def want(self, number: int, speed: float, turn: float) -> None:
-        """Set what the person wants of all robots: shares of their limits, positive to the left."""
+        """Set the person's command to all robots: shares of their limits, positive to the left."""
         for held in self.robots.values():
             held.want(number, speed, turn)
 
     def report(self, finding: str, on_result: OnResult) -> None:
-        """Say what was found where the order has led: `confirmed` or `refuted`."""
+        """Report the finding of the present order: `confirmed` or `refuted`."""
         order = self.order
         if order is None:
             on_result(False, "You have no order.")
@@ -208,7 +208,7 @@ class PersonAgent:
         for held in list(self.robots.values()):
             act(held, answers)
 
-    # --- what the DVA says ---------------------------------------------------------------
+    # --- messages of the DVA ------------------------------------------------------------
 
     def _on_request(self, message: m.Message) -> m.Reply:
         if message.source != self.device.dva:
@@ -235,7 +235,7 @@ class PersonAgent:
 
     def _on_order(self, order: m.Order) -> None:
         if order == self.order:
-            return  # the DVA says again what it has said before
+            return  # a repeated order
         self.order = order
         self._arrived = False
         robot = self.device.label_of(order.device or "")
@@ -251,7 +251,7 @@ class PersonAgent:
             self.device.progress(held.event, "departed")
 
     def _decline_alone(self, order: m.Order) -> None:
-        """Decline the order, as nobody sits here."""
+        """Decline the order, since the seat is empty."""
         if self.order is order and not self.attended:
             self.device.tell(f"declines event {order.event_id}: nobody sits here", "order")
             self._put_down("declined")

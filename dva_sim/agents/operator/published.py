@@ -1,4 +1,4 @@
-"""Published data that operators are compared with, and the role of each publication.
+"""Published data for comparison with operators, and the role of each publication.
 
 Which delays these data cover is said here as well: beyond them, what simulated operators do is
 an extrapolation.
@@ -40,7 +40,7 @@ class LineConfig(Config):
         high: Upper end of the passing band.
         above: The whole Monte Carlo interval has to lie above this, where the sign is what counts.
         below: The whole Monte Carlo interval has to lie below this.
-        beside: Shown beside what is compared, never counted: it has a target and no band.
+        beside: True for numbers that are shown but not judged, as they have no band.
     """
 
     what: str
@@ -73,7 +73,7 @@ class CheckConfig(Config):
         metric: Quantity that was measured.
         tag: Certainty of its numbers; the file explains the letters.
         source: The publication, or the derivation.
-        lines: Its numbers, by name; each is a verdict of its own.
+        lines: Numbers of the check, by name; each gets a verdict of its own.
     """
 
     metric: str
@@ -168,7 +168,7 @@ class ComparisonConfig(Config):
     Attributes:
         day: Day on which it was made.
         seen: Results that were known before it.
-        blind: Publications of which nothing had been seen before it.
+        blind: Publications that were unknown before the comparison.
     """
 
     day: date
@@ -184,10 +184,10 @@ class SplitFile(Config):
         rule: Rule by which the whole passes.
         strategy: Default strategy of the persons in all tasks.
         strategy_why: Reason for that strategy.
-        exact: Answers that nobody measured on persons.
+        exact: Checks against theory instead of measured persons.
         fit: May influence parameters; shown, never counted.
         not_fitted: May influence nothing; counted.
-        memory: Nobody has seen their source; shown, never counted.
+        memory: Numbers without a seen source; shown, but not judged.
         comparisons: Comparisons by name, in their order; a table beside has their values.
     """
 
@@ -329,7 +329,7 @@ def check_comparisons(split: SplitFile) -> None:
             seen.add(publication)
 
 
-def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
+def target_lines(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
     """Return all lines with their kind, in the order of the file of targets.
 
     Raises:
@@ -360,7 +360,7 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
 
 
 def load_history(name: str = HISTORY) -> dict[str, dict[str, float]]:
-    """Return what each comparison gave for each line, by the line's id and the comparison.
+    """Return the value of each line in each comparison, by line and comparison.
 
     Raises:
         ConfigError: no such file.
@@ -424,7 +424,7 @@ def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, flo
 
     Args:
         strategy: Strategy of the operators.
-        steering: `closed` or `waiting`: only of people who steered so.
+        steering: `closed` or `waiting`: restricts the data to people who steered so.
     """
     supports = supports_of(strategy)
     return tuple((s.low_s, s.high_s) for s in supports if steering in (None, s.steering))

@@ -1,7 +1,7 @@
 """Refusals, as an app handles them: pure, and the same for every pattern and driver.
 
-A command that was requested is answered. Of one that was published nothing comes back, but the
-robot says on its topic who holds it, and how the newest command of that device fared.
+A requested command gets a reply. A published one does not, but the robot publishes its holder and
+the outcome of the holder's newest command.
 """
 
 from __future__ import annotations
@@ -11,26 +11,26 @@ from dataclasses import dataclass, field
 
 from dva_sim.protocol import messages as m
 
-ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
-PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
+ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # only the DVA knows whether the permission holds
+PASSES = (m.STALE, m.OUT_OF_ORDER)  # codes of late commands; the next one may be in time
 LATE_FOR = 10.0
-"""Design: if nothing else has come for so long, and `REFUSALS_IN_A_ROW` of these, none will [s]."""
+"""Design: time with only refusals, at least `REFUSALS_IN_A_ROW`, before an alert [s]."""
 SAYS_LATE_FOR = 40.0
-"""Design: the same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is
-only slow ends the drive itself by then, when it has obeyed nothing for 30 s."""
-REFUSALS_IN_A_ROW = 3  # design: answers in a row of any other kind, as of sends without an answer
+"""Design: the same for published commands [s]. It is longer than `LATE_FOR`, since a robot that is
+only slow ends the drive itself after 30 s without an obeyed command."""
+REFUSALS_IN_A_ROW = 3  # design: consecutive refusals of other kinds, or sends without a reply
 TAKEN = "somebody else holds the robot"
 
 
 @dataclass
 class Refusals:
-    """Counts refusals, and says when nobody obeys any more.
+    """Counts refusals, and reports when all further commands will be refused.
 
     Attributes:
         me: Id of the device that drives.
         codes: Number of replies other than OK to commands, by code.
         last: The code that ended it.
-        late: True if every command has come late for `LATE_FOR`.
+        late: True if all commands have arrived late for `LATE_FOR`.
     """
 
     me: str
@@ -45,7 +45,7 @@ class Refusals:
     _doubtful: int = 0
 
     def answered(self, code: int | None, now: float) -> str:
-        """Take the answer to a command; return why nobody obeys any more, or nothing.
+        """Handle the reply to a command; return why all further ones will be refused, or "".
 
         Args:
             code: Code of the reply; None if it cannot be read, or belongs to something else.
@@ -63,13 +63,13 @@ class Refusals:
         return self._over(code)
 
     def held(self, holder: str | None, code: int | None, now: float, sent: int) -> str:
-        """Hear from the robot who holds it; return why nobody obeys any more, or nothing.
+        """Note the robot's holder; return why all further commands will be refused, or "".
 
         A report from before the drive may arrive late. So reports count once the robot has
         confirmed this driver, or when the same report is repeated.
 
         Args:
-            holder: Id of the device that may act; None: nobody.
+            holder: Id of the device that may act; None if there is none.
             code: Code that its newest command got, or would get; None: OK.
             now: Time [s].
             sent: Number of commands sent so far; without any, nothing new can be concluded.

@@ -1,6 +1,6 @@
-"""Operators who follow a script: what to ask next depends on the replies, never on time.
+"""Scripted operators: the next request depends on the replies, never on time.
 
-A script is a generator that yields what to ask and is sent the reply, or None if none came.
+A script is a generator that yields requests and receives the replies, or None after a time-out.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Ask(NamedTuple):
 
 
 class Pause(NamedTuple):
-    """Ask nothing for so long [s]."""
+    """Pause without requests [s]."""
 
     seconds: float
 
@@ -35,14 +35,14 @@ class ScriptedOperator:
     """Registers, then does what a script says.
 
     Args:
-        device: Identity and ways to talk.
+        device: Identity and connections of the operator.
         script: Function that makes the script for the operator, which it may ask for `seen_tick`.
 
     Attributes:
         transcript: Requests and replies: the name of the message, and the reply code; -1 without a
             reply.
         done: True once the script has ended.
-        asked: Number of requests.
+        asked: Number of requests made.
     """
 
     def __init__(self, device: AgentDevice, script: Callable[[ScriptedOperator], Script]) -> None:
@@ -70,11 +70,11 @@ class ScriptedOperator:
         network.subscribe(me, robot, STATUS, lambda data: self._on_status(robot, data))
 
     def tell(self, what: str) -> None:
-        """Say what is done, and what came of it."""
+        """Report a request and its outcome."""
         self.device.tell(what, "drive")
 
     def put_down(self) -> None:
-        """End the script here: its own last orders are sent, nobody waits for the answers."""
+        """End the script; its final requests are sent without waiting for replies."""
         if not self.done:
             self.done = True
             self._script.close()
@@ -179,15 +179,15 @@ def _answer(reply: m.Reply | None) -> str:
     return "obeyed" if reply.code == m.OK else f"refused ({m.CODE_NAMES[reply.code]})"
 
 
-COMMANDS_AGAIN = 10  # design: of the second drive
+COMMANDS_AGAIN = 10  # design: number of commands in the second drive
 GIVE_BACK_AGAIN = 2.0  # design: while the DVA cannot keep that [s]
-STANDSTILL = 2.0  # design: after it a robot certainly stands [s]
-TRIES = 20  # design: to start
+STANDSTILL = 2.0  # design: time after which a stopped robot stands [s]
+TRIES = 20  # design: maximum attempts to start a drive
 RETRY_DELAY_S = 0.5  # design: pause before a request for something missing is repeated [s]
 
 
 def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str, int]]:
-    """Wait until there is a robot that nobody holds: its id, and the session."""
+    """Wait until a robot is free; return its id and the session."""
     while True:
         listed = yield Ask(dva, m.GetDeviceList())
         content = None if listed is None else listed.content

@@ -13,11 +13,11 @@ from dva_sim.agents.operator.handheld import OnResult
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-START_TRIES = 20  # design: to start, while the grant may be on its way
-GIVE_BACK_AGAIN = 2.0  # design: after nobody has answered [s]
-GIVE_BACK_TRIES = 3  # design: of a session that the DVA does not know
-START_AGAIN = 1.0  # design: when the grant may still be on its way to the robot [s]
-NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # what is then answered
+START_TRIES = 20  # design: maximum attempts to start, as the grant may be in transit
+GIVE_BACK_AGAIN = 2.0  # design: pause after an unanswered return of a permission [s]
+GIVE_BACK_TRIES = 3  # design: attempts to return a session unknown to the DVA
+START_AGAIN = 1.0  # design: pause between two attempts to start [s]
+NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # refusals while the grant is in transit
 
 
 def watch(

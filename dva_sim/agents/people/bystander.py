@@ -60,7 +60,7 @@ Point = tuple[float, float]
 
 
 def nothing_seen(x: float, y: float, time: float) -> bool:
-    """Return the eyes of who has no hazard to see."""
+    """Return a view without any hazards."""
     return False
 
 
@@ -71,15 +71,15 @@ class BystanderAgent(OnFoot):
         name: Name as in `bystander-1`.
         clock: The run's.
         occupant: Properties of the person.
-        walking: Its legs.
+        walking: Walking model of the person.
         planner: Planner of the site.
         places: Working places; it begins at the first [m].
         refuges: Safe places [m].
         rng: Random generator of its walks in normal times.
         air: Conditions at a place [m] and time [s].
         sees: Predicate: True if flames are visible from a place [m] at a time [s].
-        leaves: Called when it is out: its body goes.
-        tell: Callback with descriptions of what happens to it.
+        leaves: Called when the person has left the site: the body is removed.
+        tell: Callback with descriptions of events for the story.
 
     Attributes:
         activity: Current activity.
@@ -124,7 +124,7 @@ class BystanderAgent(OnFoot):
         self.leaves_at = self.out_at = math.inf
 
     def start(self) -> None:
-        """Begin to work, and to notice what is wrong."""
+        """Begin to work, and to watch for danger."""
         self.exposure.start(self._felt)
         if self._occupant.moves:
             self._stay()
@@ -147,7 +147,7 @@ class BystanderAgent(OnFoot):
     # --- alarm -------------------------------------------------------------------------
 
     def alarm(self, now: float) -> None:
-        """Sound the alarm; who has left, or is about to, does not mind."""
+        """Sound the alarm; it has no effect on people who have left or are preparing to."""
         self._leave_at(now + self._occupant.premovement)
 
     def _leave_at(self, time: float) -> None:
@@ -203,22 +203,22 @@ class BystanderAgent(OnFoot):
         self._leaves()
 
 
-ELBOW_ROOM: Final = 0.3  # design: radius that must fit where somebody works [m]
+ELBOW_ROOM: Final = 0.3  # design: free radius around a place of work [m]
 START_GAP_M: Final = 0.8  # design: minimum distance between people at the start [m]
-PASSAGE: Final = 3.5  # design: a room so many times as long as wide is a corridor
-TRIES: Final = 100  # design: to find a place
+PASSAGE: Final = 3.5  # design: ratio of length to width from which a room is a corridor
+TRIES: Final = 100  # design: maximum attempts to draw a place
 
 
 def draw_places(
     site: Site, rng: np.random.Generator, count: int, taken: Sequence[Point] = ()
 ) -> list[Point]:
-    """Return places of one person [m]: rooms by their area, anywhere in them.
+    """Draw places of one person [m]: rooms by their area, uniformly in each.
 
     Args:
         site: Site of the places; on a bare map, which has no rooms, anywhere.
         rng: Random generator.
         count: Number of places.
-        taken: The first place is not near any of these [m].
+        taken: Places from which the first one keeps its distance [m].
 
     Raises:
         ConfigError: there is no such place.

@@ -1,4 +1,4 @@
-"""Guards and bystanders in bad air, and how they get out of it.
+"""Evacuation of guards and bystanders from bad air.
 
 A person looks at the air around it twice a second: that adds to its dose, and sets its pace. Who
 has to leave goes to the nearest safe place, not through what nobody endures; it looks along its
@@ -53,10 +53,10 @@ DEADLY: Final = Conditions(
 )
 """Flames and what is next to them: nobody goes through, whatever the other ways are like. Source:
 ISO 13571: in 10 kW/m^2 skin burns within seconds; the rest are habits of a person."""
-EVERY: Final = 1.0  # design: a way is looked at so often [m]
-TRIES: Final = 3  # design: to find a way around bad places
-INDOORS_MARGIN_M: Final = 0.05  # design: of the line of an exit, still indoors [m]
-ROUNDING: Final = 1e-6  # design: a straight way of many steps may seem so much shorter [m]
+EVERY: Final = 1.0  # design: distance between two checks along a path [m]
+TRIES: Final = 3  # design: maximum attempts to find a path around bad places
+INDOORS_MARGIN_M: Final = 0.05  # design: distance from the line of an exit, still indoors [m]
+ROUNDING: Final = 1e-6  # design: rounding error of a straight path of many steps [m]
 
 USUAL: Final = LeavingHabits()
 Point = tuple[float, float]
@@ -65,7 +65,7 @@ StrainLimit = Callable[[Point], float]  # 1 and more is more than one bears
 
 
 class Escape(NamedTuple):
-    """A way out: where to, and what to keep off."""
+    """A way out: its destination, and the places to avoid."""
 
     goal: Point
     avoid: tuple[Disc, ...] = ()
@@ -77,7 +77,7 @@ def strain(conditions: Conditions, most: Conditions) -> float:
 
 
 def is_deadly(conditions: Conditions) -> bool:
-    """Return True if not even people who are in smoke already go there."""
+    """Return True if even people in smoke do not go there."""
     return strain(conditions, DEADLY) >= 1.0
 
 
@@ -101,7 +101,7 @@ def choose_escape(
     limits: Sequence[StrainLimit],
     habits: LeavingHabits = USUAL,
 ) -> Escape | None:
-    """Return the nearest refuge by the way there, on a way without bad places.
+    """Return the refuge with the shortest path without bad places.
 
     A longer way around bad places is taken if every refuge's shortest way leads through some.
     If there is none either, less has to do: a way that keeps the limits but the first. If no
@@ -111,7 +111,7 @@ def choose_escape(
         planner: Planner of the site.
         here: Current position; a person in bad air goes through no worse to the first good place.
         refuges: Safe places, regardless of the conditions there: outdoors is beyond [m].
-        limits: Each says how much of what one bears a place is; the strictest first.
+        limits: Functions of a place's load relative to a tolerable one; the strictest first.
         habits: Habits of the person.
     """
     for k in range(len(limits)):
@@ -128,7 +128,7 @@ def _keeping(
     limits: Sequence[StrainLimit],
     habits: LeavingHabits,
 ) -> Escape | None:
-    """Return the nearest refuge on a way that keeps limits, around more and more bad places."""
+    """Return the nearest refuge on a path within the limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
         hazardous: dict[Point, None] = {}
@@ -147,7 +147,7 @@ def _keeping(
 def _nearest_first(
     planner: Planner, here: Point, refuges: Sequence[Point], avoid: Sequence[Disc]
 ) -> Iterator[tuple[Point, Floats]]:
-    """Yield refuges that can be reached and the ways there, the shortest first.
+    """Yield reachable refuges and the paths to them, the shortest first.
 
     No way is shorter than the straight line: none is planned before a known one that is.
     """
@@ -184,10 +184,10 @@ def _length(path: Floats) -> float:
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
-PERIOD: Final = 0.5  # design: between two looks at the air [s]
+PERIOD: Final = 0.5  # design: interval of checks of the air [s]
 HURT: Final = 0.3
-"""Source: ISO 13571: a dose beyond which a guard works no more; 1 stops half of all people, 0.3 is
-what all but the most susceptible still bear."""
+"""Source: ISO 13571: dose beyond which a guard stops working; 1 incapacitates half of all people,
+0.3 only the most susceptible."""
 
 AirAt = Callable[[float, float, float], Conditions]
 
@@ -229,7 +229,7 @@ class Exposure:
             self._clock.every(PERIOD, lambda: self._look(then))
 
     def end(self) -> None:
-        """Let the person out of it."""
+        """End the exposure of the person."""
         self._over = True
 
     def step_out(self) -> None:
@@ -256,7 +256,7 @@ class Exposure:
 
     @property
     def is_hurt(self) -> bool:
-        """True if the dose is more than a person goes on working with."""
+        """True if the dose is too high to continue working."""
         return max(self.dose.heat, self.dose.toxic) >= HURT
 
     def is_bad(self, place: tuple[float, float]) -> bool:
@@ -264,12 +264,12 @@ class Exposure:
         return strain(self._air(*place, self._clock.now), self._untenable) >= 1.0
 
     def is_deadly(self, place: tuple[float, float]) -> bool:
-        """Return True if nobody would pass a place [m] now."""
+        """Return True if a place [m] is impassable now."""
         return strain(self._air(*place, self._clock.now), self._deadly) >= 1.0
 
     @property
     def limits(self) -> tuple[StrainLimit, StrainLimit]:
-        """Limits to keep: what is untenable, or where that is impossible, what is deadly."""
+        """Limits to keep: untenable air, or where that is impossible, deadly air."""
         return self._strain(self._untenable), self._strain(self._deadly)
 
     def _strain(self, most: Conditions) -> StrainLimit:
@@ -278,9 +278,9 @@ class Exposure:
 
 
 class WayOut:
-    """Leads a person to the nearest safe place, as long as there is a way.
+    """Leads a person to the nearest safe place, as long as a path exists.
 
-    A person who finds none stands still, and searches again and again.
+    A person without a path stands still, and repeats the search.
 
     Args:
         clock: The run's.
@@ -321,7 +321,7 @@ class WayOut:
         self._walking.stop()
 
     def look_ahead(self) -> None:
-        """Choose again if what is next on the way has become bad; at once, if deadly."""
+        """Choose again if the next part of the path has become bad; at once if it is deadly."""
         soonest = self._habits.chooses_again_s
         ahead = self._walking.places_ahead(1.0, self._habits.looks_ahead_m)
         since = self._clock.now - self._chosen
@@ -353,7 +353,7 @@ class WayOut:
             self._clock.call_after(pause, self._choose_again, self._choices)
 
     def _choose_again(self, choices: int) -> None:
-        """Try once more, unless something else has been chosen since."""
+        """Repeat the search, unless another goal has been chosen since."""
         if choices == self._choices:
             self._choose()
 
@@ -362,7 +362,7 @@ class OnFoot:
     """A person on foot.
 
     Args:
-        walking: Its legs.
+        walking: Walking model of the person.
         exposure: Exposure of the person.
     """
 
@@ -382,7 +382,7 @@ class OnFoot:
 
     @property
     def heading(self) -> float:
-        """Direction in which it looks [rad]."""
+        """Viewing direction [rad]."""
         return self.walking.heading
 
     @property

@@ -1,4 +1,4 @@
-"""Guards: people who walk to an event, look at it, deal with it, and get out of what is too much.
+"""Guards: people who walk to an event, confirm and contain it, and withdraw from danger.
 
 A guard **withdraws** as soon as what is around it is untenable, what is right ahead of it deadly,
 or its dose is `HURT`: whatever it was on, it tells `failed`, and goes to its post or the nearest
@@ -28,8 +28,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.planning import Planner
 
-STATUS_PERIOD = 2.0  # design: between two reports of a guard's position [s]
-FIRST_STATUS = 0.5  # design: until the first of them [s]
+STATUS_PERIOD = 2.0  # design: interval of reports of a guard's position [s]
+FIRST_STATUS = 0.5  # design: time until the first report [s]
 CONFIRMED = "confirmed"
 REFUTED = "refuted"
 CONTAINED = "contained"
@@ -41,14 +41,14 @@ class GuardAgent(OnFoot):
     """A guard on duty: walks, looks, works and tells; what it is on is decided by `GuardProtocol`.
 
     Args:
-        device: Identity and ways to talk.
+        device: Identity and connections of the guard.
         walker: Walking and working properties.
         planner: The guard knows the building.
-        walking: Its legs; where they stand first is its post.
+        walking: Walking model; its first position is the guard's post.
         is_there: Predicate: True if a hazard of a kind really is near a place [m].
         contain: Callback with the kind and place of a contained event [m].
         air: Conditions at a place [m] and time [s].
-        refuges: Ways out, where it is safe whatever the air there [m].
+        refuges: Exits, which are safe regardless of the air there [m].
         smoke: Optical depth of the smoke between two places now.
     """
 
@@ -93,7 +93,7 @@ class GuardAgent(OnFoot):
         position = m.Position(*self.device.frame.to_latlon(*self.walking.place))
         self.device.publish(STATUS, m.PersonStatus(self.activity, position))
 
-    # --- what the DVA says -------------------------------------------------------------
+    # --- messages of the DVA ----------------------------------------------------------
 
     def _on_request(self, message: m.Message) -> m.Reply:
         answer = self._protocol.handle(message, self.device.clock.now)
@@ -104,7 +104,7 @@ class GuardAgent(OnFoot):
         return m.Reply(message.message_id, answer.code, answer.text)
 
     def _take_up(self, errand: Errand | None) -> None:
-        """Begin another errand; the steps of an older one come to nothing by themselves."""
+        """Begin another errand; pending steps of an older one have no effect."""
         if errand is None:
             self.walking.stop()
             self.activity = "waiting"
@@ -120,7 +120,7 @@ class GuardAgent(OnFoot):
         self.device.clock.call_at(self._protocol.ready_at, self._depart, errand)
 
     def _bid(self, announced: m.TaskAnnouncement) -> None:
-        """Offer to go, by what only this guard knows: its pace, and where it stands now."""
+        """Bid for a task, with this guard's own pace and position."""
         if self._protocol.order is not None:
             return
         distance = self._planner.distance(self.walking.place, self._xy(announced.position))
@@ -132,7 +132,7 @@ class GuardAgent(OnFoot):
         if arrival <= MAX_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
-    # --- the way -----------------------------------------------------------------------
+    # --- walking -----------------------------------------------------------------------
 
     def _depart(self, errand: Errand) -> None:
         if errand is not self._protocol.errand:
@@ -180,13 +180,13 @@ class GuardAgent(OnFoot):
     def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
         """Return True if a place is near enough [m], with neither wall nor thick smoke between.
 
-        As for cameras, smoke hides no fire: who stands before thick smoke has found one.
+        As for cameras, thick smoke itself counts as a sign of the fire.
         """
         if math.dist(at, place) > within or not self._planner.line_of_sight(at, place):
             return False
         return KINDS[kind].shines or self._smoke(at, place) < SEEN_THROUGH
 
-    # --- what is done there ------------------------------------------------------------
+    # --- work at the event ------------------------------------------------------------
 
     def _arrive(self, errand: Errand) -> None:
         order = errand.order
@@ -206,7 +206,7 @@ class GuardAgent(OnFoot):
                 clock.call_after(self._walker.look, self._looked, errand)
 
     def _give_up(self, errand: Errand) -> None:
-        """Give up standing by, after nobody has needed this guard for so long."""
+        """End standing by, after this guard has not been needed for a while."""
         if errand is self._protocol.errand:
             self._finish("failed")
 
@@ -248,7 +248,7 @@ class GuardAgent(OnFoot):
         self._protocol.is_over(at_event)
         self.activity = "waiting"
 
-    # --- what is too much --------------------------------------------------------------
+    # --- withdrawal ------------------------------------------------------------------
 
     def _felt(self) -> None:
         """Breathe this air for half a second more."""
@@ -280,7 +280,7 @@ class GuardAgent(OnFoot):
         return order is None or not self._is_in_reach(order, self._xy(order.position), at)
 
     def _give_back(self, unfit: str) -> None:
-        """Be of no more use, for that reason, to whatever the guard was on."""
+        """Abandon the present errand, for a reason."""
         order = self._protocol.order
         self._protocol.unfit = unfit
         if order is None:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from dva_sim.protocol import messages as m
 
-AWARD_WITHIN = 60.0  # design: after the last bid for so long an award may come [s]
+AWARD_WITHIN = 60.0  # design: time after the last bid in which an award may arrive [s]
 MAX_ANNOUNCED = 32  # design: announcements that are remembered; the oldest are forgotten first
 ORDER_DONE = "done"  # the DVA's word that an order is over
 
@@ -73,7 +73,7 @@ class GuardProtocol:
     )
 
     def obey(self, dva: str) -> None:
-        """Take orders of another DVA from now on; the one in hand goes on."""
+        """Take orders of another DVA from now on; the present order continues."""
         self.dva = dva
 
     @property
@@ -82,7 +82,7 @@ class GuardProtocol:
         return None if self.errand is None else self.errand.order
 
     def handle(self, message: m.Message, now: float) -> GuardDecision:
-        """Decide on a message that came at `now` [s]."""
+        """Decide on a message that arrived at `now` [s]."""
         if message.source != self.dva:
             return GuardDecision(m.NOT_PERMITTED, "only the DVA gives orders")
         if self.unfit and not isinstance(message.body, m.OrderProgress):
@@ -127,7 +127,7 @@ class GuardProtocol:
         return self._set_out(Errand(place), now)
 
     def _set_out(self, errand: Errand, now: float) -> GuardDecision:
-        """Set out on an errand; a guard under way, or on scene, need not get ready again."""
+        """Set out on an errand; a guard on the way or on scene needs no time to get ready."""
         order = errand.order
         if self.errand is None:
             is_there = order is not None and order.event_id == self._at_event

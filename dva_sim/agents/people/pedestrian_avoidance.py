@@ -34,8 +34,8 @@ from dva_sim.worlds.bodies import Body, RobotBody
 RELAXATION: Final = 0.5  # source: Moussaid 2011: [s]
 HORIZON: Final = 10.0  # source: Moussaid 2011: where one would be if nothing were there [m]
 FAN: Final = np.deg2rad([0, -15, 15, -30, 30, -45, 45, -60, 60, -75, 75])  # source: Moussaid 2011
-PROBES: Final = np.array([0.25, 0.5, 1.0])  # design: where a way is tried for walls [m]
-FEELS_ROOM: Final = 0.05  # design: a place is measured to so much [m]
+PROBES: Final = np.array([0.25, 0.5, 1.0])  # design: distances of checks for walls [m]
+FEELS_ROOM: Final = 0.05  # design: resolution of free distances [m]
 USUAL: Final = WalkingHabits()
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def is_clear(
 ) -> bool:
     """Return True if walking on would touch nobody; then the rules keep the direction.
 
-    Asked first, since mostly it is so, and it costs little.
+    This quick check comes first, since it is usually true.
     """
     vx = speed * math.cos(heading)
     vy = speed * math.sin(heading)
@@ -110,7 +110,7 @@ def is_clear(
 
 
 def _up_to_bodies(me: Mover, velocities: Floats, others: Sequence[Mover], berth: float) -> Floats:
-    """Return the way before touching the first of `others`, by velocity `(n, 2)` [m].
+    """Return the free distance before touching any of `others`, by velocity `(n, 2)` [m].
 
     Discs touch when |p - w t| = r, with the place p and the velocity w of one relative to the
     other: the smaller root of a quadratic.
@@ -130,7 +130,7 @@ def _up_to_bodies(me: Mover, velocities: Floats, others: Sequence[Mover], berth:
 
 
 def _up_to_walls(me: Mover, ways: Floats, room: Callable[[Floats], Floats]) -> Floats:
-    """Return the way before touching a wall, for each of some directions `(n, 2)` [m]."""
+    """Return the free distance to a wall in each direction `(n, 2)` [m]."""
     points = (me.x, me.y) + ways[:, None, :] * PROBES[None, :, None]
     fits = room(points.reshape(-1, 2)).reshape(len(ways), -1) >= me.radius - FEELS_ROOM
     reached = np.concatenate([[0.0], PROBES[:-1], [HORIZON]])
@@ -140,7 +140,7 @@ def _up_to_walls(me: Mover, ways: Floats, room: Callable[[Floats], Floats]) -> F
 
 @dataclass(frozen=True)
 class Door:
-    """A door on a way: how far along the way it is, and its middle [m]."""
+    """A door on a path: its distance along the path, and its middle [m]."""
 
     along: float
     x: float
@@ -155,7 +155,7 @@ def middles_of(doors: Floats, narrow: float) -> Floats:
 
 
 def doors_on(path: Floats, middles: Floats) -> list[Door]:
-    """Return the doors that a way `(n, 2)` goes through, in its order."""
+    """Return the doors on a path `(n, 2)`, in order."""
     if not len(middles):
         return []
     gaps = np.hypot(*(path[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
@@ -166,7 +166,7 @@ def doors_on(path: Floats, middles: Floats) -> list[Door]:
 
 
 class Courtesy:
-    """Courtesy of one person at the doors on its way.
+    """Courtesy of one person at the doors on its path.
 
     Args:
         doors: On the way, in its order.
@@ -179,7 +179,7 @@ class Courtesy:
         self._since: float | None = None  # when it began to wait [s]
 
     def waits_for(self, me: Body, gone: float, near: Sequence[Body], now: float) -> Door | None:
-        """Return the door that this person lets somebody else through first.
+        """Return the door at which this person lets another one pass first.
 
         Args:
             me: Person who walks.
@@ -204,7 +204,7 @@ class Courtesy:
 def _comes_through(
     door: Door, me: Body, near: Sequence[Body], habits: WalkingHabits
 ) -> Body | None:
-    """Return who approaches a door and has priority, being nearer, or a robot in it."""
+    """Return the body with priority at a door: the nearest that approaches, or a robot in it."""
     mine, (ux, uy) = _towards(door, me)
     for other in near:
         its = math.dist((other.x, other.y), (door.x, door.y))

@@ -1,7 +1,8 @@
-"""A person as a guard: a device like any other guard's, whose decisions are somebody's own.
+"""A person as a guard: a guard's device whose decisions a real person makes.
 
-It takes the DVA's orders by the protocol of all guards, and says what the person says. Its body
-stands where the person says it is. Where nobody sits, an order is declined after a while.
+It takes the DVA's orders by the protocol of all guards, and reports the person's entries. Its body
+stands at the position that the person enters. If nobody plays it, orders are declined after a
+while.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.event_kinds import SEVERITIES
 from dva_sim.worlds.planning import Planner
 
-DECLINED_AFTER: Final = 30.0  # design: an order to a guard whom nobody plays [s]
-SET_OUT: Final = 2.0  # design: who is so far from where the order came has departed [m]
+DECLINED_AFTER: Final = 30.0  # design: time until an order without a player is declined [s]
+SET_OUT: Final = 2.0  # design: distance walked since the order that counts as departed [m]
 FINDINGS: Final = (CONFIRMED, REFUTED, CONTAINED)
 SAYINGS: Final = ("departed", "arrived", *FINDINGS, "help")
 
@@ -37,14 +38,14 @@ OnResult = Callable[[bool, str], object]
 
 
 class PersonGuard(OnFoot):
-    """A guard whom a person plays, or nobody.
+    """A guard that a person can play.
 
     Args:
-        device: Identity and ways to talk.
-        walker: At what pace the DVA may expect it.
+        device: Identity and connections of the guard.
+        walker: Profile with the pace that the DVA expects.
         planner: Planner of the site.
-        walking: Its body; where it stands first is its post.
-        put: Puts that body somewhere else [m].
+        walking: Walking model; its first position is the guard's post.
+        put: Function that moves the body to a position [m].
         contain: Callback with the kind and place of a contained event [m].
         air: Conditions at a place [m] and time [s].
 
@@ -77,7 +78,7 @@ class PersonGuard(OnFoot):
         self.attended = self.answered = self._needs_help = False
         self.alert = ""
         self.wanted = 0
-        self._stage = ""  # of the order: departed, arrived
+        self._stage = ""  # last reported stage of the order
         self._order_at: Point = walking.place
         self._protocol = GuardProtocol(device.dva, 0.0, self._is_at)
         device.on_dva = self._protocol.obey
@@ -117,7 +118,7 @@ class PersonGuard(OnFoot):
         points = [] if path is None else [[round(x, 2), round(y, 2)] for x, y in path.tolist()]
         return place, self._planner.distance(self.walking.place, place), points
 
-    # --- what the person does ----------------------------------------------------------------
+    # --- actions of the person --------------------------------------------------------------
 
     def join(self) -> None:
         """Let a person play this guard from now on."""
@@ -144,10 +145,10 @@ class PersonGuard(OnFoot):
             on_result(True, f"event {order.event_id} is given back")
 
     def say(self, what: str, on_result: OnResult) -> None:
-        """Say how it goes, one of `SAYINGS`."""
+        """Report progress, one of `SAYINGS`."""
         order = self.order
         if what == "help":
-            self._needs_help = not self._needs_help  # said once more, it is over
+            self._needs_help = not self._needs_help  # a second report withdraws the first
             now = "need help" if self._needs_help else "need no help any more"
             self.device.tell(now.replace("need", "needs", 1), "safety")
             self._publish_status()
@@ -198,12 +199,12 @@ class PersonGuard(OnFoot):
         self._tell(body, f"event {order.event_id} is {finding}", on_result)
         self.device.tell(f"{finding} event {order.event_id}", "event")
         if finding == CONFIRMED and order.task == "contain":
-            return  # it is still there to be contained
+            return  # it still has to be contained
         self.device.progress(order.event_id, "done")
         self._end(at_event=True)
 
     def _reach(self, order: m.Order, stage: str) -> None:
-        """Tell the DVA each stage once, in their order; who gets there has accepted."""
+        """Report each stage to the DVA once, in order; arrival implies acceptance."""
         if not self.answered:
             self.answered = True
             self.device.progress(order.event_id, "accepted")
@@ -236,7 +237,7 @@ class PersonGuard(OnFoot):
         unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
         self.device.ask(self.device.dva, body, answered, unreachable)
 
-    # --- what the DVA says -------------------------------------------------------------------
+    # --- messages of the DVA ----------------------------------------------------------------
 
     def _on_request(self, message: m.Message) -> m.Reply:
         had = self.order
@@ -249,7 +250,7 @@ class PersonGuard(OnFoot):
         return m.Reply(message.message_id, answer.code, answer.text)
 
     def _changed(self, had: m.Order | None, errand: Errand | None) -> None:
-        """Take another errand, or none any more."""
+        """Change to another errand, or to none."""
         self.answered = False
         self._stage = ""
         self._order_at = self.walking.place
@@ -267,7 +268,7 @@ class PersonGuard(OnFoot):
             self.wanted = 0
 
     def _decline_alone(self, order: m.Order) -> None:
-        """Decline the order, as nobody plays the guard."""
+        """Decline the order, since nobody plays the guard."""
         if self.order is order and not self.attended:
             self._give_back("declined", "nobody sits here")
 

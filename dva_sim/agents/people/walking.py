@@ -1,4 +1,4 @@
-"""Walking: a planned way, a body on it, and what to do when somebody is in the way.
+"""Walking: a planned path, a body on it, and reactions to people and robots in the way.
 
 Guards and bystanders walk alike. A way is planned on the map; five times a second, or half as
 often where nobody is near, the walker looks where it is and chooses the velocity that its legs
@@ -43,10 +43,10 @@ from dva_sim.worlds.bodies import Body, RobotBody
 from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Disc, Planner
 
-STEP: Final = 0.2  # design: between looks at the way [s]
-CALM: Final = 0.4  # design: the same while nobody is near and the end is not [s]
-PLANS_EVERY: Final = 1.0  # design: no other way is planned sooner than this after the last [s]
-MAX_SEEN: Final = 8  # design: of those near, the nearest count
+STEP: Final = 0.2  # design: interval of steps [s]
+CALM: Final = 0.4  # design: interval of steps far from others and the end [s]
+PLANS_EVERY: Final = 1.0  # design: minimum interval between two plans of a path [s]
+MAX_SEEN: Final = 8  # design: maximum number of nearest bodies considered
 
 
 @dataclass(eq=False)
@@ -55,9 +55,9 @@ class Walk:
 
     Attributes:
         goal: Destination [m].
-        arrived: Called at its end.
-        blocked: Called when it is given up.
-        is_far_enough: From where on it need not be gone to its end.
+        arrived: Called at the end of the walk.
+        blocked: Called when the walk is given up.
+        is_far_enough: Predicate of positions at which the walk may end early.
         avoid: Places to go around.
     """
 
@@ -69,12 +69,12 @@ class Walk:
     route: Route
     courtesy: Courtesy
     avoid: tuple[Disc, ...]
-    gone: float = 0.0  # along the way [m]
-    least: float = math.inf  # of what was left of the way, so far [m]
-    nearer_at: float = 0.0  # when it last became less [s]
-    looks_around: float = 0.0  # when another way is looked for [s]
-    planned: float = 0.0  # when its way was chosen [s]
-    robots: set[Disc] = field(default_factory=set)  # that stood in the way
+    gone: float = 0.0  # distance covered along the path [m]
+    least: float = math.inf  # minimum remaining distance so far [m]
+    nearer_at: float = 0.0  # time of the last progress [s]
+    looks_around: float = 0.0  # time of the next search for a way around [s]
+    planned: float = 0.0  # time at which the path was chosen [s]
+    robots: set[Disc] = field(default_factory=set)  # robots that stood in the way
 
 
 class Walking:
@@ -84,7 +84,7 @@ class Walking:
         clock: The run's.
         planner: The person knows the building.
         ground: World with all others.
-        body: Its own.
+        body: Body of the person.
         speed: Free walking speed [m/s].
         doors: Ends of the doors, shape `(n, 4)` [m].
         habits: Habits of the person; by default the usual ones.
@@ -127,7 +127,7 @@ class Walking:
 
     @property
     def walks(self) -> bool:
-        """True if it is on its way."""
+        """True if a walk is in progress."""
         return self._walk is not None
 
     def go(
@@ -138,17 +138,17 @@ class Walking:
         is_far_enough: Callable[[Point], bool] = lambda at: False,
         avoid: Sequence[Disc] = (),
     ) -> bool:
-        """Walk somewhere; what was under way before is forgotten.
+        """Begin a walk, in place of any earlier one.
 
         Args:
             goal: Destination [m].
-            arrived: Called there.
-            blocked: Called if somebody is in the way for good.
-            is_far_enough: From where on the way need not be gone to its end.
+            arrived: Called at the end of the walk.
+            blocked: Called if the way is blocked permanently.
+            is_far_enough: Predicate of positions at which the walk may end early.
             avoid: Places to go around.
 
         Returns:
-            Whether there is a way.
+            True if a path exists.
         """
         points = self._planner.path(self.place, goal, avoid)
         if points is None:
@@ -174,7 +174,7 @@ class Walking:
         return True
 
     def places_ahead(self, every: float, reach: float) -> list[Point]:
-        """Places that it will come to next on its way, so far apart and up to so far off [m]."""
+        """Return the next places on the path, at a spacing and up to a distance [m]."""
         if self._walk is None:
             return []
         route = self._walk.route
@@ -222,7 +222,7 @@ class Walking:
         return ahead.remaining < own.crowded_m and now - walk.nearer_at > own.tired_s
 
     def _push_on(self, walk: Walk, ahead: Ahead) -> bool:
-        """Want a velocity for the next step; whether somebody is near."""
+        """Choose the velocity of the next step; return True if anybody is near."""
         speed = min(self.speed * self.pace, ahead.remaining / self._own.braking_s)
         near = self._others()
         if near and self._clock.now >= walk.looks_around:
@@ -304,7 +304,7 @@ class Walking:
         return past(robot, along, body, self._planner.room_at, own.sideways_m)
 
     def _look_around(self, walk: Walk, near: Sequence[Body]) -> None:
-        """Look for a way around who stands there; longer and longer pauses between."""
+        """Search for a path around standing people, at increasing intervals."""
         now = self._clock.now
         walk.looks_around = now + max(self._own.tired_s, now - walk.nearer_at)
         slow = self._own.standing_mps
@@ -315,7 +315,7 @@ class Walking:
             walk.least = walk.route.length
 
     def _plan(self, walk: Walk, avoid: Sequence[Disc]) -> bool:
-        """Take another way, from where one is now; whether there is one."""
+        """Change to another path from here; return False if there is none."""
         points = self._planner.path(self.place, walk.goal, (*walk.avoid, *avoid))
         if points is None:
             return False

@@ -1,7 +1,7 @@
 """Avoidance of people and other robots: lanes, right of way, and places to wait.
 
-A lane is the planned path shifted sideways while somebody is there. Where both sides are equally
-good everybody keeps to the right, so that two who meet do not dodge to the same side.
+A lane is the planned path, shifted sideways near people and robots. If both sides are equally good,
+everybody keeps to the right, so that two who meet do not dodge to the same side.
 
 Right of way where only one fits through: people before robots; then a robot that is already in the
 narrow part; then the robot with the lower number. The other one steps aside.
@@ -42,7 +42,7 @@ TO_THE_LEFT = 0.2  # additional cost of a lane on the left [m]
 CHANGE = 0.3  # cost of changing lanes per distance between them
 PACE = 0.4  # speed assumed for the robot's own progress [m/s]
 FORESEEN = 6.0  # time for which others are expected to keep their velocity [s]
-NARROW = 0.35  # a smaller gap to the wall lets nobody pass [m]
+NARROW = 0.35  # gap to the wall below which nobody can pass [m]
 REFUGE = 3.0  # maximum distance of a place to step aside to [m]
 SPARE = 0.15  # gap between a robot that has stepped aside and one that passes [m]
 
@@ -65,7 +65,7 @@ class Blocked(NamedTuple):
     Attributes:
         by: The nearest obstacle in the lane.
         distance: Distance to it [m].
-        gap: The smallest gap to anybody on that lane [m].
+        gap: Smallest gap to any other body on that lane [m].
         lane: The lane with most room.
     """
 
@@ -186,7 +186,7 @@ class Avoidance:
     def refuge(self, here: Point, route: Floats, others: Sequence[Nearby]) -> Point | None:
         """Return the nearest place beside the path where the robot blocks nobody.
 
-        None if there is none.
+        None if there is no such place.
 
         Args:
             here: Current position [m].

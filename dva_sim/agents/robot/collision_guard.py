@@ -35,7 +35,7 @@ class Nearby(NamedTuple):
 
     Attributes:
         kind: `robot` or `person`.
-        name: Name of a robot; for people only a way to tell them apart.
+        name: Name of a robot, or identifier of a person.
         x: Position to the east [m].
         y: Position to the north [m].
         vx: Velocity to the east [m/s].
@@ -63,8 +63,8 @@ def who_is_near(
     """Return the bodies in sight with their velocities, the nearest first.
 
     Args:
-        body: Robot whose sensors look.
-        within: Their reach [m].
+        body: Robot with the sensors.
+        within: Range of the sensors [m].
         sees: Predicate: True if nothing stands between two places.
     """
     here = body.x, body.y
@@ -122,7 +122,7 @@ class CollisionGuard:
         Args:
             pose: Position and heading [m, rad].
             speed: Requested speed [m/s].
-            turn_rate: Requested turn rate, which stays as it is [rad/s].
+            turn_rate: Requested turn rate, which is not changed [rad/s].
             others: Others nearby.
         """
         for _ in range(ROUNDS):
@@ -175,7 +175,7 @@ class CollisionGuard:
 
 
 def _first(flags: NDArray[np.bool_]) -> int:
-    """Return the index of the first true value; the length if there is none."""
+    """Return the index of the first true value; the length if all are false."""
     at = int(flags.argmax())
     return at if flags[at] else len(flags)
 

@@ -35,14 +35,14 @@ AFTER_HOLDER = 1.0  # maximum further wait of strangers for a message of the hol
 TICK = 1e-6  # resolution of the clock [s]
 
 
-PUBLISHED: Final = object()  # key of the publisher of commands, of which there is one at a time
+PUBLISHED: Final = object()  # key of the queue of published commands
 
 
 class Standing(IntEnum):
     """Standing of a message's sender: why a robot should listen to it."""
 
     HOLDER = 0  # proved by the session, or by the robot's own subscription
-    DVA = 1  # claimed by the sender; without keys anybody can
+    DVA = 1  # claims to be the DVA, which anybody can without keys
     OTHER = 2
 
 
@@ -53,11 +53,11 @@ class Letter(NamedTuple):
     """A message that has arrived.
 
     Attributes:
-        data: Its bytes.
+        data: Bytes of the message.
         arrived: Arrival time [s].
-        request: Request that carried it; None if nobody waits for a reply.
+        request: Request that carried it; None if no reply is expected.
         message: Content, where the queue can decode it.
-        moves: True for a command; everything else is control.
+        moves: True for a command; all other messages are control.
     """
 
     data: bytes
@@ -68,12 +68,12 @@ class Letter(NamedTuple):
 
     @property
     def answer(self) -> Answer | None:
-        """Takes the reply; None if nobody waits for one."""
+        """Callback for the reply; None if no reply is expected."""
         return None if self.request is None else self.request.answer
 
     @property
     def peer(self) -> Hashable:
-        """The connection that it came by."""
+        """Connection by which the message arrived."""
         return PUBLISHED if self.request is None else self.request.peer
 
 
@@ -95,7 +95,7 @@ class FairQueue:
     Args:
         limit: Maximum number of queued messages of the holder; of others no more than
             `MAX_OF_OTHERS`.
-        standing: Current standing of a message's sender: a grant that comes meanwhile counts.
+        standing: Function that returns the present standing of a sender, by the newest grants.
 
     Attributes:
         length: Number of queued messages.
@@ -256,7 +256,7 @@ class CommandQueue:
         return at_work or self._waiting.has(DVA)
 
     def request(self, request: Request) -> None:
-        """Take a request whose sender waits for the answer."""
+        """Queue a request whose sender waits for the reply."""
         data = request.data
         message = None
         # A cheap look at the bytes, so that a flood of emergencies is refused before it is parsed.
@@ -374,7 +374,7 @@ class CommandQueue:
         return None
 
     def _others_rest(self) -> bool:
-        """Return True if strangers have to wait although nobody else does.
+        """Return True if strangers have to wait although the queue is otherwise empty.
 
         Right after a message of the holder there is most time until its next one.
         """
@@ -393,7 +393,7 @@ class CommandQueue:
             self._work()
 
     def _finish(self, letters: list[Letter]) -> None:
-        """Finish processing, including emergencies that came meanwhile."""
+        """Finish processing, including emergencies that arrived meanwhile."""
         # The same list: emergencies that arrived during the processing are in it, and answered.
         if letters is self._emergencies:
             self._emergencies = []

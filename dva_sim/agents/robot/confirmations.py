@@ -24,8 +24,8 @@ class Waiting:
 
     Attributes:
         letter: The message.
-        reader: Its sender, if it asks to read sensors; None: it asks to act.
-        asked: True if the question under way was asked after the message had arrived.
+        reader: Sender, if the message requests sensor data; None if it requests an action.
+        asked: True if the open query was sent after the message had arrived.
     """
 
     letter: Letter
@@ -97,7 +97,7 @@ class Confirmations:
         return [wait for wait in self._waiting if wait.reader == reader]
 
     def _answered(self, reply: m.Reply) -> None:
-        if self._device.silent:  # the computer hangs or has no power, so it cannot hear
+        if self._device.silent:  # the computer hangs or has no power, so it receives nothing
             self._failed()
             return
         question = self._inquiry.asked

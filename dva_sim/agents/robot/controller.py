@@ -102,7 +102,7 @@ class RobotController:
         grant: Permission of its holder, as the DVA has confirmed it.
         observers: Permissions to read its sensors, by device, as the DVA has confirmed them.
         inquiry: Open questions to the DVA.
-        by_hand: Person who drives it by hand, at the robot itself; None: nobody does.
+        by_hand: Person who drives it by hand, at the robot itself; None if nobody does.
         latch: Latch that an emergency closes; while it holds, no order moves the robot.
     """
 
@@ -228,7 +228,7 @@ class RobotController:
     # --- by hand, at the robot itself ---------------------------------------------------
 
     def take_by_hand(self, who: str, now: float, moving: bool) -> Decision:
-        """Let somebody at the robot drive it, without a message and without a session.
+        """Let a person at the robot drive it, without messages and without a session.
 
         Only a robot that is idle and that nobody holds can be taken so; from then on it is busy
         for everybody else, until it is let go, an emergency comes, or nothing is heard for long.
@@ -431,7 +431,7 @@ class RobotController:
 
     @property
     def free(self) -> bool:
-        """True if it is idle and nobody holds it: then it can be sent somewhere."""
+        """True if it is idle and nobody holds it, so that it can be sent on a mission."""
         idle = self.mode is IDLE and self.by_hand is None and not self.latch.holds
         return idle and self.owner is None and self.grant is None
 

@@ -79,7 +79,7 @@ class DecisionLog:
         )
 
     def happened(self, what: str, now: float) -> None:
-        """Note what time, the world or a hand at the robot changed: one of the words above."""
+        """Log a change by time, the world or a hand at the robot: one of the words above."""
         self._write({"happened": what, "now": now})
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ def replay(
             else:
                 decision = _again(controller, entry)
         except _BROKEN as error:
-            # The file may come from anywhere, so each value in it may be wrong.
+            # The file is untrusted, so each value in it may be wrong.
             problem = f"is no line of a robot's trace: {_in_words(error)}"
             raise ConfigError(problem, path, number) from error
         if decision is not None:

@@ -42,7 +42,7 @@ class EmergencyLatch:
     released_by: m.ReleasedBy | None = None
 
     def close(self, stopped_by: str | None, now: float, tick: int) -> None:
-        """Hold the robot; an emergency that comes while it is held needs a release of its own."""
+        """Hold the robot; a further emergency needs a further release."""
         if not self.holds:
             self.stopped_by = stopped_by
             self.since = now
@@ -52,7 +52,7 @@ class EmergencyLatch:
         self.tick = tick
 
     def release(self, released: m.ByWhom | None) -> None:
-        """Let the robot take orders again."""
+        """Release the robot, so that it takes orders again."""
         self.holds = False
         self.released = released
 

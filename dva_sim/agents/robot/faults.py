@@ -62,7 +62,7 @@ class RobotFaults:
             self._robot.inbox.service = service
 
     def drop_replies(self, on: bool) -> None:
-        """Let all replies be lost on their way, or none."""
+        """Drop all replies, or none."""
         if on is self.drops_replies:
             return
         self.drops_replies = on
@@ -90,14 +90,14 @@ class RobotFaults:
             self._tell("its computer has restarted")
 
     def lose_camera(self, on: bool) -> None:
-        """Let it take no pictures, or take them again."""
+        """Disable or enable the camera."""
         if on is self.camera_lost:
             return
         self.camera_lost = self._robot.blind = on
         self._tell("fault: its camera is lost" if on else "its camera is back")
 
     def stick(self, sensor: str, on: bool) -> None:
-        """Let a sensor give its last values for ever, or measure again.
+        """Freeze a sensor at its last values, or let it measure again.
 
         Raises:
             KeyError: it has no such sensor.

@@ -26,7 +26,7 @@ class Inquiry:
     """The open questions of a robot to the DVA.
 
     Attributes:
-        asked: The question under way.
+        asked: Open query to the DVA.
         asked_at: Time of the question [s].
     """
 
@@ -34,7 +34,7 @@ class Inquiry:
     asked_at: float = -math.inf
     _holder: bool = False  # whether the question about the holder is pending
     _claimed: str | None = None  # latest device that was claimed to be the holder
-    _by_name: bool = False  # whether an older DVA has to be asked about one device by id
+    _by_name: bool = False  # True for an older DVA, which is asked about a device by id
     _readers: OrderedDict[str, None] = field(default_factory=OrderedDict)
     _readers_next: bool = False
     _over: set[int] = field(default_factory=set)
@@ -71,7 +71,7 @@ class Inquiry:
             self._readers[device] = None
 
     def is_over(self, session: int) -> None:
-        """Note that a session is said to be over: an answer under way may be older than that."""
+        """Note a claim that a session is over; an answer in transit may be older."""
         if self.asked is not None and len(self._over) <= MAX_OVER:
             self._over.add(session)
 
@@ -100,7 +100,7 @@ class Inquiry:
         return self.asked
 
     def answered(self, reply: m.Reply) -> m.GetGrant | None:
-        """Take the answer to the question under way; return that question, if this settles it.
+        """Handle the answer to the open query; return the query if it is settled.
 
         The DVA must be asked again if it does not know the robot yet, if it understands only
         questions about one device (before 1.6), or if its answer may be older than the end of a

@@ -32,7 +32,7 @@ class Surrounded:
         clock: The run's clock.
         world: The physics.
         body: The robot's own.
-        planner: Its map.
+        planner: Planner with the map of the site.
     """
 
     def __init__(self, clock: Clock, world: World, body: RobotBody, planner: Planner) -> None:

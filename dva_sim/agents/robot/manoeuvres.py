@@ -24,7 +24,7 @@ GAIN = 2.0  # turn rate per error of the heading [1/s]
 FACING = 0.1  # a robot faces a place if its heading is off by less than this [rad]
 MANOEUVRE_MPS = 0.25  # speed of manoeuvres [m/s]; assumed
 GET_AWAY = 0.5  # distance driven after a jam before planning again [m]; assumed
-HEADINGS = 16  # headings that are compared for a way out
+HEADINGS = 16  # number of headings compared for a way out
 TRIED_WITHIN_RAD = 0.5  # headings this near one that did not help rank last [rad]
 REACHED_WITHIN_M = 0.15  # distance at which a place beside the path counts as reached [m]
 FREE_FOR = 1.0  # time for which the path must be free before a robot goes on [s]; assumed
@@ -76,7 +76,7 @@ class Manoeuvre:
     reason: str
 
     def step(self, percept: Sensed) -> Intent | None:
-        """Return what to do now; None when the manoeuvre is over."""
+        """Return the motion now; None when the manoeuvre is over."""
         raise NotImplementedError
 
 
@@ -159,7 +159,7 @@ class Aside(Manoeuvre):
             self._moved = percept.now
         stays = self._arrived and percept.now - self._moved > NOBODY_MOVES
         if percept.now - self._free_since >= FREE_FOR or percept.now > self._until or stays:
-            return None  # the path is free, time is up, or nobody will come past
+            return None  # the path is free, time is up, or nobody is approaching
         self._arrived = self._arrived or math.dist(percept.here, self._place) < REACHED_WITHIN_M
         if self._arrived:
             return Intent(0.0, 0.0)
@@ -187,9 +187,9 @@ class Aside(Manoeuvre):
 MATCH_WITHIN = 4.0  # a hazard this near the place of an event is the one reported there [m]
 KEEP_OFF = 1.2  # distance from which the place of an event is inspected [m]
 LOOK_FROM = 4.0  # distance from which an event in view is inspected [m]; assumed
-FIRST_LOOK = 3.0  # time with nothing in view before it looks all around [s]; assumed
+FIRST_LOOK = 3.0  # time with an empty view before it looks all around [s]; assumed
 LOOK_AROUND = 0.4  # turn rate of looking around [rad/s]; assumed
-INSPECT_FOR = 120.0  # time after which an inspection ends that nobody ends [s]; assumed
+INSPECT_FOR = 120.0  # maximum duration of an inspection [s]; assumed
 
 
 class Inspection:

@@ -41,7 +41,7 @@ class ManualControl:
         return decision
 
     def drive(self, who: str, speed: float, turn_rate: float) -> Decision:
-        """Take the speed [m/s] and turn rate [rad/s] that the person wants."""
+        """Set the speed [m/s] and turn rate [rad/s] that the person commands."""
         robot = self._robot
         now = self._robot.device.clock.now
         if robot.device.silent:

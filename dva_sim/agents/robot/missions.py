@@ -1,4 +1,4 @@
-"""Missions: how a robot reaches places by itself, and what it does if somebody is in the way.
+"""Missions: autonomous driving to places, with people and other robots in the way.
 
 Pure: from what the robot knows at a moment it decides the motion and the state of the mission.
 The rules, in the order in which they are applied:
@@ -84,13 +84,13 @@ NO_PROGRESS = 15.0  # time without progress that counts as a jam, too [s]; assum
 STOP_SHORT = 1.0  # distance left free before an obstacle [m]; assumed
 STANDS_BELOW_MPS = 0.05  # slower bodies count as standing [m/s]
 # Waits of a blocked robot, from when it was blocked [s]; all assumed.
-SAY_AFTER = 0.5  # until it reports that somebody is in the way [s]
-ASIDE_AFTER = 1.0  # until it steps aside for a robot that goes first [s]
-AROUND_AFTER = 4.0  # until it looks for a path around [s]
-AROUND_AGAIN = 6.0  # between two such looks [s]
+SAY_AFTER = 0.5  # time until it reports an obstacle [s]
+ASIDE_AFTER = 1.0  # time until it steps aside for a robot with the right of way [s]
+AROUND_AFTER = 4.0  # time until it plans a path around the obstacle [s]
+AROUND_AGAIN = 6.0  # interval of such plans [s]
 DETOUR_MARGIN_M = 0.08  # additional gap of a path around somebody [m]
-SQUEEZE_AFTER = 10.0  # until it goes nearer to people [s]
-GIVE_UP_AFTER = 60.0  # until the mission fails [s]
+SQUEEZE_AFTER = 10.0  # time until it reduces the gap to people [s]
+GIVE_UP_AFTER = 60.0  # time until the mission fails [s]
 
 
 class PilotStep(NamedTuple):
@@ -154,11 +154,11 @@ class Pilot:
         self._blocked_since = math.inf
         self._looked_around = -math.inf
         self._left_aside: str | None = None
-        self._moved = -math.inf  # when the obstacle was last seen to move [s]
+        self._moved = -math.inf  # time of the obstacle's last motion [s]
         self._progress = (math.inf, math.inf)  # shortest remaining path [m], and since when [s]
 
     def step(self, percept: Sensed) -> PilotStep:
-        """Return what to do now."""
+        """Return the motion and the state of the mission now."""
         if percept.charge < RESERVE and not self._errand.home:
             return self._end("failed", "battery")
         percept = self._with_patience(percept)
@@ -191,7 +191,7 @@ class Pilot:
         speed = self._guard.limit(pose, speed, intent.turn_rate, percept.nearby)
         return PilotStep(Intent(speed, intent.turn_rate), state, self._left, reason)
 
-    # --- on the way --------------------------------------------------------------------
+    # --- free path ---------------------------------------------------------------------
 
     def _travel(self, percept: Sensed) -> PilotStep:
         route = self._route or self._plan(percept)
@@ -255,7 +255,7 @@ class Pilot:
             return self._end("done", finding)
         return self._move(percept, inspection.step(percept), "waiting", finding)
 
-    # --- in the way --------------------------------------------------------------------
+    # --- blocked path ------------------------------------------------------------------
 
     def _with_patience(self, percept: Sensed) -> Sensed:
         """Let a robot that has waited long go nearer to people, until none is in sight."""
@@ -268,7 +268,7 @@ class Pilot:
         return percept._replace(nearby=closer)
 
     def _wait(self, percept: Sensed, route: Route, along: float, blocked: Blocked) -> PilotStep:
-        """Stop short; then step aside, or look for a way around, or give up."""
+        """Stop before the obstacle; then step aside, plan a path around it, or give up."""
         self._blocked_since = min(self._blocked_since, percept.now)
         waited = percept.now - self._blocked_since
         if math.hypot(blocked.by.vx, blocked.by.vy) > STANDS_BELOW_MPS:

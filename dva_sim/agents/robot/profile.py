@@ -101,7 +101,7 @@ def load_robot(name: str) -> RobotProfile:
     """Return the profile of a name or path.
 
     Raises:
-        ConfigError: not found, or not valid.
+        ConfigError: the profile does not exist or is not valid.
     """
     return read_robot(load_yaml(resources.find(name, FOLDER)))
 

@@ -63,7 +63,7 @@ DRIVING = m.StartTeleOp, m.SetTeleOp
 MAX_HELD = 1e6  # longest holding time that a message can state [s]
 WHATEVER_WAITS = 1 << 40  # a size below which no backlog of the link holds a message back [B]
 STATUS_PERIOD = 1.0  # time between two status messages [s]
-WAKES_UP = 1.0  # what arrives this soon after a sleep may have been sent before its end [s]
+WAKES_UP = 1.0  # time after a sleep in which messages may date from before its end [s]
 EXPECTED_SPEED = 0.35  # speed under teleoperation, for bids; the DVA expects the same [m/s]
 EXPECTED_READY = 4.0  # time until an operator drives, for bids; the DVA expects the same [s]
 STANDING = 0.02  # slower wheels count as still [m/s, rad/s]
@@ -106,11 +106,11 @@ class RobotAgent:
     """A robot: obeys its controller, moves its body, publishes frames, status, heartbeats.
 
     Args:
-        device: Identity and ways to talk.
+        device: Identity and connections of the robot.
         controller: Controller that decides.
         world: The physics that it is part of.
-        body: Its own body there.
-        planner: Its map, for missions.
+        body: Body of the robot in that world.
+        planner: Planner with the map, for missions.
         setup: Pattern, processing time, camera.
         drive_of: The log of a robot's newest drive, if it had any.
 
@@ -209,7 +209,7 @@ class RobotAgent:
         clock.every(STATUS_PERIOD, self._publish_status)
 
     def observe(self) -> Observation:
-        """Return what the camera sees now."""
+        """Return the present view of the camera."""
         now = self.device.clock.now
         self._world.advance_to(now)
         body = self.body
@@ -294,7 +294,7 @@ class RobotAgent:
         self._confirmations.ask()
 
     def _obeys(self, dva: str) -> None:
-        """Obey another DVA from now on, and tell it the current driver, who continues."""
+        """Obey another DVA from now on, and report the driver to it, who continues."""
         self.controller.dva = dva
         self.device.connect(dva)
         grant = self.controller.grant
@@ -334,7 +334,7 @@ class RobotAgent:
         self._publish_holder()
 
     def return_to_service(self) -> None:
-        """Take orders again: what made the robot unfit is over."""
+        """Take orders again, since the robot is fit again."""
         self.unfit = ""
         self.device.withdrawn = False
         self.device.tell("can be driven again", "mode")
@@ -357,7 +357,7 @@ class RobotAgent:
         message = None if self.device.silent else self.device.admit(request)
         if message is None or not isinstance(body := message.body, RESTRICTED):
             return message
-        if self._standing_of(message) is not queue.OTHER:
+        if self._sender_standing(message) is not queue.OTHER:
             return message
         is_informed = self.inbox.hears_the_dva or self.controller.inquiry.is_open
         if (is_informed or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
@@ -368,7 +368,7 @@ class RobotAgent:
         self.device.conclude(request, message, answer, at_once=True)
         return None
 
-    def _standing_of(self, message: m.Message) -> Standing:
+    def _sender_standing(self, message: m.Message) -> Standing:
         if self.controller.knows(message):
             return queue.HOLDER
         return queue.DVA if message.source == self.controller.dva else queue.OTHER
@@ -377,7 +377,7 @@ class RobotAgent:
         """Return the standing of a publisher: the holder, since the robot subscribed to it."""
         if letter.request is None or letter.message is None:
             return queue.HOLDER
-        return self._standing_of(letter.message)
+        return self._sender_standing(letter.message)
 
     def _is_driven(self) -> bool:
         return self.controller.mode is TELEOPERATION
@@ -390,7 +390,7 @@ class RobotAgent:
             self.device.turn_away(letter.request, letter.message, refusal)
 
     def _published(self, data: bytes) -> None:
-        """Take a published command of the driver; anything else takes no time."""
+        """Queue a published command of the driver; other messages cost no processing time."""
         message = None if self.device.silent else self.device.read(data, self.controller.owner)
         if message is None:
             return
@@ -409,7 +409,7 @@ class RobotAgent:
             self._conclude(letter)
 
     def _conclude(self, letter: Letter, waited: bool = False) -> None:
-        """Answer a letter, unless it has to wait until the DVA has been asked."""
+        """Answer a letter, unless it has to wait for a query to the DVA."""
         if letter.request is not None and letter.message is not None and not self.device.silent:
             answer = partial(self._reply, letter, waited=waited)
             self.device.conclude(letter.request, letter.message, answer)
@@ -652,7 +652,7 @@ class RobotAgent:
         frame = make_frame(self.observe(), self.device.clock.now)
         if self.filmed is not None:
             self.filmed(me, frame)
-        # The frame shows what was there before encoding; it is published once that is done.
+        # The frame is captured before encoding, and published afterwards.
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)

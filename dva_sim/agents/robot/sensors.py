@@ -6,7 +6,7 @@ sample is keyed by the sensor and the number of the sample: reading one sensor, 
 often, changes no other value. A sensor with a lag is switched on by its first subscriber, shows the
 true value at once, and follows from then on.
 
-A *lost* sensor gives nothing any more; a *stuck* one gives its last values for ever.
+A *lost* sensor gives no values; a *stuck* one repeats its last values for ever.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ KINDS = {
 
 
 class FaultConfig(Config):
-    """One way in which a sensor fails, at a time or by chance.
+    """A fault of a sensor, at a fixed or random time.
 
     Attributes:
         kind: `lost`: no values from then on. `stuck`: the last values for ever.
@@ -219,7 +219,7 @@ class FaultConfig(Config):
 
 
 class SensorConfig(Config):
-    """A sensor that a robot carries; what is left out is as usual for its kind (`KINDS`).
+    """A sensor of a robot; missing values are those of its kind (`KINDS`).
 
     Attributes:
         name: Name of the kind.
@@ -327,7 +327,7 @@ class RobotSensor:
         return self._lagged
 
     def _normals(self, sample: int, count: int) -> Floats:
-        """Return standard normal numbers of one sample, shape `(count,)`."""
+        """Return the standard normal numbers for one sample, shape `(count,)`."""
         block, index = divmod(sample, BLOCK)
         if self._noise[0] != block or self._noise[1].shape[1] != count:
             self._noise = block, self._streams(f"noise {block}").normal(size=(BLOCK, count))

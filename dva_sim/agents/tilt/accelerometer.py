@@ -21,7 +21,7 @@ GRAVITY: Final = 9.80665  # source: ISO 80000-3: [m/s^2]
 ROUNDING_TERM: Final = (
     1.5 * 2.0**52
 )  # design: added and taken away, which rounds four times as fast
-TICK: Final = 2.0**-12  # design: of the clock that tells when a sample is taken [s]
+TICK: Final = 2.0**-12  # design: resolution of sample times [s]
 
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
@@ -35,7 +35,7 @@ class AccelerometerPart(Config):
 
     Attributes:
         data_sheet: Source of the numbers.
-        assumed: Keys whose numbers are not in it.
+        assumed: Keys whose numbers are not in the data sheet.
         rate_hz: Samples per second.
         noise_density_ug: White noise [micro-g per root hertz]; with `bandwidth_hz`.
         bandwidth_hz: Bandwidth of the part's own low-pass filter.
@@ -44,7 +44,7 @@ class AccelerometerPart(Config):
         offset_mg_per_k: Change of the offset with temperature.
         drift_mg_per_sqrt_min: Random walk of the output within a session.
         resolution_mg: Step of the output; 0: none.
-        range_g: Largest output, either way.
+        range_g: Maximum output in either direction.
     """
 
     description: str = ""
@@ -86,7 +86,7 @@ def load_part(name: str) -> AccelerometerPart:
     """Return the part of that name, or in that file.
 
     Raises:
-        ConfigError: there is none, or it cannot be read.
+        ConfigError: the file does not exist or cannot be read.
     """
     document = load_yaml(resources.find(name, FOLDER))
     return validate(AccelerometerPart, document.data, document.error)
@@ -106,7 +106,7 @@ class Accelerometer:
         rate_hz: Rate of samples for the app, if other than the part's.
         jitter: Standard deviation of the time of a sample, as a share of the time between two.
         warming: Standard deviation of a session's temperature, against the calibration's [K].
-        block: Number of samples whose random numbers are drawn at once; changes no number.
+        block: Number of samples whose random numbers are drawn at once; no effect on results.
 
     Attributes:
         period: Mean time between two samples [s].

@@ -21,7 +21,7 @@ from dva_sim.agents.tilt.profile import PhoneProfile
 from dva_sim.kernel.makers import maker
 
 TIE: Final = 1e-9  # design: moments nearer than this are the same [s]
-_TICK: Final = 1e-6  # design: a look by a clock that rounds may come so much too soon [s]
+_TICK: Final = 1e-6  # design: tolerance for rounded clock times [s]
 
 
 def calibrated(profile: PhoneProfile, reference: Triple) -> Calibration:
@@ -42,7 +42,7 @@ class TiltCommand(NamedTuple):
         turn_rate: [rad/s]
         sample_age: Mean age of the information in the reading that the command was made of:
             from the samples that the filter holds, each with its weight in the value, to now [s].
-            All that the phone delays is in it once: waiting for the next sample, the filter, and
+            It contains each delay of the phone once: waiting for the next sample, the filter, and
             how long its value has stood. The lag of the hand is before it, the mapping after it.
         captured: Mean capture time of the pictures behind it [s]; for the recorder.
     """
@@ -57,7 +57,7 @@ _make_command = maker(TiltCommand)
 
 
 class Trail:
-    """Takes the time at which a picture was captured the way that the tilt takes.
+    """Carries the capture time of pictures through the same filters as the tilt.
 
     The hand averages what it is asked to do, and the filter averages what the hand does. The
     same hand and the same filter, given capture times in place of tilts, answer when the
@@ -73,7 +73,7 @@ class Trail:
         self.begin(0.0)
 
     def begin(self, now: float) -> None:
-        """Begin a drive; what is behind the tilt until a picture is followed counts from now."""
+        """Begin a drive; until a picture is followed, the tilt counts as based on `now`."""
         self._filter = self._make_filter()
         # Since the beginning, as empty slots of a filter hold a zero.
         self._begun = now
@@ -81,7 +81,7 @@ class Trail:
         self._hand = 0.0
 
     def follow(self, captured: float) -> None:
-        """Let the hand follow what a picture captured at that time [s] led to, from now on."""
+        """Let the hand follow a command based on a picture captured at that time [s]."""
         self._asked = captured - self._begun
 
     def move(self, decay: float) -> float:
@@ -93,7 +93,7 @@ class Trail:
         return self._hand
 
     def take(self, hand: float) -> None:
-        """Let the filter take such a sample after all."""
+        """Let the filter take the sample."""
         self._filter.add((hand, hand))
 
     def sample(self, count: int, decay: float) -> None:
@@ -122,7 +122,7 @@ class Trail:
 
 
 class TiltApp:
-    """An app of a phone. What comes of a sample depends on when it was taken, never on who looks.
+    """An app of a phone. The effect of a sample depends only on its time, not on when it is read.
 
     Args:
         profile: Settings of reading, filter, mapping and sending.
@@ -214,7 +214,7 @@ class TiltApp:
         self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def followed(self, captured: float) -> None:
-        """Let samples be by a picture that was captured at that time [s], from now on."""
+        """Attribute samples to a picture captured at that time [s], from now on."""
         self._trail.follow(captured)
 
     def next_look(self, now: float, rate_hz: float) -> float:
@@ -242,7 +242,7 @@ class TiltApp:
 
     def _command(self, now: float) -> TiltCommand | None:
         if self._on_sample and self._batch is not None and not self.values:
-            return None  # as printed, nothing is sent before there is a value
+            return None  # as published, no command is sent before the first value
         if not self._ideal and self._batch is None:
             if not self._watches:
                 level, turn = self._filter.value()
@@ -275,7 +275,7 @@ class TiltApp:
         return self._heard_at + self._period
 
     def _advance(self, now: float) -> None:
-        """Advance by all that was due by now."""
+        """Process all samples that are due."""
         if self._queue and not self._held:
             self._work_off(now)
         self.take_values(now)
@@ -290,7 +290,7 @@ class TiltApp:
             self._watch(passed)
 
     def _miss(self, at: float, reading: Reading) -> None:
-        """Miss a sample that comes while a request is open."""
+        """Skip a sample that arrives while a request is open."""
         hand = self._trail.move(self._decay)
         if self._queues:
             self._queue.append((at, reading, hand))
@@ -311,7 +311,7 @@ class TiltApp:
             self.shown = self._mapping.command(*self._filter.value(), dt)
 
     def _take_value(self, at: float) -> None:
-        """Take the value of a batch that is complete, or whose time is over."""
+        """Take the value of a complete batch, or of one whose time is over."""
         self.samples += self._fresh
         self.values += 1
         reading = self._filter.value()

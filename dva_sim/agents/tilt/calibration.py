@@ -1,4 +1,4 @@
-"""The app's calibration: what a tilt means, and how often the app says it."""
+"""The app's calibration: the conversion of tilt to commands, and their rate."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
 
 LEVELS: Final = 10.0  # source: the document: speed levels; one is SPEED_PER_LEVEL
 SPEED_PER_LEVEL: Final = 0.05  # source: the document: [m/s]
-MAX_TURN_DEG: Final = 30.0  # source: the document: either way, per second
+MAX_TURN_DEG: Final = 30.0  # source: the document: maximum turn rate in either direction [deg/s]
 
 Reading = tuple[float, float]  # speed level, turn [deg/s]
 SIDE_KNOWN: Final = 3.0  # design: a phone calibrated so upright has no side up [m/s^2]
-NEUTRAL: Final[Reading] = (0.0, 0.0)  # design: of a phone at rest: stand
+NEUTRAL: Final[Reading] = (0.0, 0.0)  # design: reading of a phone at rest: stand
 
 
 class Calibration:
@@ -27,7 +27,7 @@ class Calibration:
         reference: x, y, z at rest in the pose that means nothing [m/s^2].
         speed_step: Acceleration along x for one level of speed [m/s^2].
         turn_step: Acceleration along y for one degree per second [m/s^2].
-        max_delay: Longest time between two looks at the filter [s].
+        max_delay: Maximum time between two reads of the filter [s].
     """
 
     def __init__(
@@ -46,9 +46,9 @@ class Calibration:
         self._turn_step = turn_step
 
     def reading(self, ax: float, ay: float, az: float) -> Reading:
-        """Return level and turn [deg/s] of a sample; z only tells which side is up."""
+        """Return level and turn [deg/s] of a sample; z only shows which side is up."""
         if az * self._z < 0.0:
-            return NEUTRAL  # upside down against the reference: nobody steers so
+            return NEUTRAL  # upside down relative to the reference: not a command
         return (ax - self._x) / self._speed_step, (ay - self._y) / self._turn_step
 
     def pose(self, level: float, turn: float) -> tuple[float, float]:

@@ -47,7 +47,7 @@ def to_tilt_axes(measured: Triple, orientation: int = 0, ios: bool = False) -> T
 
 
 def to_device_axes(tilt: Triple, orientation: int = 0, ios: bool = False) -> Triple:
-    """Return the inverse of `to_tilt_axes`: what a browser would tell."""
+    """Return the inverse of `to_tilt_axes`: the values that a browser reports."""
     forwards, left, z = tilt
     right_x, right_y, top_x, top_y = _SCREEN[orientation]
     x = right_x * left - top_x * forwards

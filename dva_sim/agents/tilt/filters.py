@@ -1,7 +1,7 @@
 """Filters between the accelerometer and the command: one class each, shipped or a user's.
 
-All take samples one by one and are asked for a value when one is due. A filter knows the mean
-time between samples and nothing else: no clock, no random numbers.
+All take samples one by one and return a value on request. A filter knows only the mean time
+between samples: no clock, no random numbers.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Filter(ABC):
 
     @property
     def age(self) -> float:
-        """Mean age of what the value is made of, in samples: 0 if it is the newest one alone.
+        """Mean age of the value's samples, in samples: 0 for the newest sample.
 
         It is by how many samples the value lags behind an input that rises steadily.
         """
@@ -202,7 +202,7 @@ class OnePole(Filter):
 
 
 class NoFilter(Filter):
-    """The newest sample as it is."""
+    """The newest sample, unfiltered."""
 
     def __init__(self, period: float) -> None:
         super().__init__(period)
@@ -237,7 +237,7 @@ FILTERS: Final[dict[str, Callable[..., Filter]]] = {
 
 
 def _usable(filter_: Filter) -> Filter:
-    """Return one of a user's, if a phone could work with it."""
+    """Return a user's filter, if a phone can work with it."""
     check_filter(filter_)
     return filter_
 
@@ -277,7 +277,7 @@ def load_filter(
 def load_guarded_filter(
     name: str, chosen: Mapping[str, Any] | None = None
 ) -> Callable[[float], Filter]:
-    """Return `load_filter`'s factory with a user's filter kept within what can be sent.
+    """Return `load_filter`'s factory, with a user's filter limited to valid commands.
 
     Raises:
         ConfigError: as `load_filter`.
@@ -316,7 +316,7 @@ class GuardedFilter(Guard, Filter):
         period: Mean time between two samples [s].
 
     Raises:
-        ConfigError: no phone could work with it.
+        ConfigError: a phone cannot work with it.
     """
 
     def __init__(self, filter_: Filter, period: float) -> None:

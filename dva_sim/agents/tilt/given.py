@@ -1,7 +1,7 @@
-"""A phone that is tilted exactly as asked: what a person gives by key, pointer or gamepad.
+"""A phone that is tilted exactly as commanded, by a person with keys, pointer or gamepad.
 
-No hand lags and no part is noisy: the person has a hand of its own. All else is the same app, so
-that what is asked takes the same filter, mapping and rule of sending as a tilt does.
+Hand lag and sensor noise are not simulated, as the person has a real hand. The app is the same, so
+that input passes the same filter, mapping and sending rule as a tilt.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ MIN_WITHIN = 0.1  # design: a gap on the display is closed no sooner than in thi
 
 
 class GivenTilt(TiltApp):
-    """A phone in nobody's hand.
+    """A phone without a simulated hand.
 
-    Samples are made when somebody looks, for all the time since, at the profile's rate.
+    Samples are made on request, for all the time since the last one, at the profile's rate.
 
     Args:
         profile: Phone and app.
@@ -44,7 +44,7 @@ class GivenTilt(TiltApp):
         self._tilt = self._tilted()
 
     def ask(self, now: float, speed: float, turn_rate: float) -> None:
-        """Set what is wanted from `now` on: speed [m/s], turn rate [rad/s]."""
+        """Set the command from `now` on: speed [m/s], turn rate [rad/s]."""
         self._advance(now)
         self.followed(now)
         self._wanted = limited(speed / SPEED_PER_LEVEL, math.degrees(turn_rate))
@@ -68,7 +68,7 @@ class GivenTilt(TiltApp):
         self.take_values(now)
 
     def _tilted(self) -> Triple:
-        """Return what a perfect part measures of the wanted tilt [m/s^2]."""
+        """Return a perfect sensor's reading of the commanded tilt [m/s^2]."""
         within = max(MIN_WITHIN, self._period)
         pitch, roll = self._pose(*self._mapping.tilt_for(self._wanted, self.shown, within))
         flat = GRAVITY * math.cos(pitch)

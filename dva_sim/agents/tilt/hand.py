@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 TREMOR_HZ: Final = 10.0  # source: Lakie 2015: middle of the 8-12 Hz band of hand tremor
-TREMOR: Final = 0.0043  # design: of devices in tasks [rad]; phones have a key for each of these
+TREMOR: Final = 0.0043  # design: tremor in tasks with a device [rad]; phones have keys for these
 MAX_TILT: Final = math.radians(45.0)  # design: the same [rad]
 MAX_SPEED: Final = math.radians(200.0)  # design: the same [rad/s]
 
@@ -32,11 +32,11 @@ class Hand:
         lag: Time constant [s]; 0: it is where it aims at once.
         rng: Random generator of the hand.
         motor_noise: Standard deviation of the error of aiming, as a share of the tilt.
-        tremor: Apparent tilt, standard deviation of each axis [rad].
+        tremor: Standard deviation of the apparent tilt on each axis [rad].
         max_tilt: Away from rest, each axis [rad].
         max_speed: Highest tilting speed, each axis [rad/s].
         tremor_width: Width of the tremor's resonance, between half-power frequencies [Hz].
-        block: Number of steps whose random numbers are drawn at once; changes no number.
+        block: Number of steps whose random numbers are drawn at once; no effect on results.
 
     References:
         M. Lakie, C. A. Vernooij, C. J. Osler et al.: Increased gravitational force reveals the
@@ -94,7 +94,7 @@ class Hand:
         return self._pitch + self._tremor * one.real, self._roll + self._tremor * other.real
 
     def _tune(self, dt: float) -> tuple[float, float, float, complex, float]:
-        """Return what depends only on the length of a step; there are few of them."""
+        """Return the factors that depend only on the length of a step; cached, as there are few."""
         keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
         damping = self._damping
         swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)

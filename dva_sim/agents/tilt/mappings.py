@@ -1,6 +1,6 @@
 """Mappings from a filtered reading to a command: one class each, shipped or a user's.
 
-Whatever happens on the phone, what it sends is absolute: a speed and a turn rate.
+In all mappings the phone sends absolute values: a speed and a turn rate.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ class Mapping(ABC):
         """Return the reading that a practised hand tilts to.
 
         Args:
-            wanted: Desired command; a level below 0 means: surely stand.
+            wanted: Desired command; a level below 0 means to stand for certain.
             shown: Displayed command, as the person has perceived it.
             within: Time in which to get there [s].
         """
 
     def begin(self) -> None:  # noqa: B027 - most mappings have nothing to forget
-        """Begin a drive: forget what was integrated."""
+        """Begin a drive: reset all integrated values."""
 
 
 class AbsoluteMapping(Mapping):
@@ -132,7 +132,7 @@ class LeakyMapping(DifferentialMapping):
         gain: Growth of the turn rate for each degree per second of the reading [1/s].
         speed_gain: Gain of the speed.
         dead_zone: Share of the full reading around the reference that means nothing.
-        leak_s: Time constant in which it goes back [s].
+        leak_s: Time constant of the return to zero [s].
     """
 
     def __init__(
@@ -156,13 +156,13 @@ class LeakyMapping(DifferentialMapping):
 
     @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        # What closes the gap, and what holds the shown rate against the leak.
+        # One part closes the gap, the other compensates the leak.
         held = within * shown[1] / self._leak
         return super().tilt_for((wanted[0], wanted[1] + held), shown, within)
 
 
 class SlewMapping(AbsoluteMapping):
-    """The turn rate goes towards what the tilt means, but no faster than a limit.
+    """The turn rate approaches that of the tilt, with a limited rate of change.
 
     A phone held level lets it go back to zero as fast. The speed is absolute.
 
@@ -207,12 +207,12 @@ def outside(value: float, zone: float) -> float:
 
 
 def beyond(value: float, zone: float) -> float:
-    """Return the inverse of `outside`: a value that is so much outside; zero stays zero."""
+    """Return the inverse of `outside`; zero stays zero."""
     return value + math.copysign(zone, value) if value else 0.0
 
 
 def limited(level: float, turn: float) -> Reading:
-    """Return a reading within what a command can be: no reverse, and limits of both rates."""
+    """Return a reading clamped to valid commands: no reverse, and limited rates."""
     return (
         0.0 if level < 0.0 else LEVELS if level > LEVELS else level,
         -MAX_TURN_DEG if turn < -MAX_TURN_DEG else MAX_TURN_DEG if turn > MAX_TURN_DEG else turn,
@@ -263,7 +263,7 @@ def load_mapping(
 
 
 def load_guarded_mapping(name: str, options: Options[str, Any] | None = None) -> Mapping:
-    """Make a mapping for a run: a user's is kept within what can be sent.
+    """Make a mapping for a run; a user's mapping is limited to valid commands.
 
     Raises:
         ConfigError: as `load_mapping`.
@@ -291,7 +291,7 @@ class GuardedMapping(Guard, Mapping):
 
     @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        # Limited, as a person who wants to stand may ask for less than zero.
+        # Limited, as a person who wants to stand may command less than zero.
         level, turn = self._answer(self._mapping.command, level, turn, dt) or NEUTRAL
         level = self._clamp("asks for level", max(level, 0.0), 0.0, LEVELS)
         return level, self._clamp("asks for [deg/s]", turn, -MAX_TURN_DEG, MAX_TURN_DEG)

@@ -1,4 +1,4 @@
-"""A phone whose samples are measured by a part of its own: they come when they come."""
+"""A real phone, whose measured samples arrive at irregular times."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.app import TiltApp
 from dva_sim.agents.tilt.calibration import Reading
 
-SOONEST: Final = 0.005  # design: from one look to the next, while a batch is late [s]
+SOONEST: Final = 0.005  # design: minimum interval of checks for a late batch [s]
 
 
 class MeasuredTilt(TiltApp):
@@ -33,5 +33,5 @@ class MeasuredTilt(TiltApp):
 
     @override
     def next_look(self, now: float, rate_hz: float) -> float:
-        # A late batch is looked for again after `SOONEST`, not at once.
+        # A late batch is checked for again after `SOONEST`, not at once.
         return max(super().next_look(now, rate_hz), now + SOONEST)

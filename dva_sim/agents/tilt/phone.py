@@ -1,4 +1,4 @@
-"""A phone in a hand: what is wanted goes in, commands come out, by a chain of small stages.
+"""A phone in a hand: a chain of stages from the desired motion to commands.
 
 The way is the dissertation's: wanted -> the reading to tilt to (`Mapping.tilt_for`) -> `Hand` ->
 `Accelerometer` -> `Calibration` -> `Filter` -> `Mapping.command` -> a rule for when it is sent.
@@ -26,7 +26,7 @@ from dva_sim.agents.tilt.profile import PhoneProfile
 
 __all__ = ["Phone", "PhoneProfile", "TiltCommand", "Trail", "try_phone"]
 
-SURELY: Final = -1.0  # design: the level that a person tilts to who wants to stand
+SURELY: Final = -1.0  # design: level to which a person tilts in order to stand
 
 
 class Phone(TiltApp):
@@ -42,7 +42,7 @@ class Phone(TiltApp):
 
     Args:
         profile: Phone and app.
-        holder: Person who holds it.
+        holder: Person who holds the phone.
         rng: Random generator of this run.
         own: Random generator of this person's copy of the phone and its calibration, the same in
             all runs; by default that of this run.
@@ -90,7 +90,7 @@ class Phone(TiltApp):
         x, y, z = profile.reference_mps2
         dx, dy = own.normal(0.0, profile.reference_error_mps2, 2).tolist()
         offset = self._accelerometer.offset
-        # The owner held the phone as meant, roughly; what it then measured is the reference.
+        # The reference is the reading at rest, in roughly the intended position.
         reference = x + offset[0] + dx, y + offset[1] + dy, z + offset[2]
         super().__init__(profile, reference, period, decay)
         self._felt = calibrated(profile, profile.reference_mps2)
@@ -112,7 +112,7 @@ class Phone(TiltApp):
             held = (probe.age + 0.5) * self._period
         return (holder.perceptual_delay + holder.hand_lag + held) / holder.margin
 
-    # --- what others ask ---------------------------------------------------------------
+    # --- requests ---------------------------------------------------------------------
 
     def pick_up(self, now: float) -> None:
         """Begin a drive: the hand is at rest, the app starts with nothing in its filter."""
@@ -153,7 +153,7 @@ class Phone(TiltApp):
     def _next_sample(self) -> float:
         return self._sample_at
 
-    # --- what happens meanwhile --------------------------------------------------------
+    # --- simulation ------------------------------------------------------------------
 
     def _advance(self, now: float) -> None:
         """Advance by all samples and values that were due."""
@@ -165,7 +165,7 @@ class Phone(TiltApp):
             return
         if self._queue:
             self._work_off(now)
-            if self._queue:  # what came later has to wait for its turn
+            if self._queue:  # later samples wait for their turn
                 return
         while True:
             due = self._due + TIE
@@ -213,7 +213,7 @@ class Phone(TiltApp):
         self._fresh = fresh
 
     def _miss_until(self, end: float) -> None:
-        """Miss samples that come while a request is open: the hand moves on, the app is busy."""
+        """Skip samples while a request is open: the hand moves, but the app is blocked."""
         rest_pitch, rest_roll = self._rest
         while self._sample_at <= end:
             if self._watches:
@@ -238,7 +238,7 @@ class Phone(TiltApp):
 
 
 def try_phone(profile: PhoneProfile) -> None:
-    """Load all that a profile names, and make it once.
+    """Load all plug-ins of a profile, and make each once to check it.
 
     Raises:
         ConfigError: a part, a filter or a mapping that cannot be had, or an option of them.

@@ -17,7 +17,7 @@ RESTARTED: Final = 2.0  # design: times so far back are of another count, as aft
 
 
 class PhoneClock:
-    """Sets the times of one phone.
+    """Converter of the times of one phone to our clock.
 
     Attributes:
         offset: Offset of our time against the phone's [s]; infinite before the first sample.
@@ -30,15 +30,15 @@ class PhoneClock:
         self._last = -math.inf
 
     def is_old(self, stamp: float) -> bool:
-        """Return True if what was told for a time [s] is obsolete."""
+        """Return True if data for a time [s] is obsolete."""
         return self._last_stamp - RESTARTED < stamp <= self._last_stamp
 
     def times_of(self, stamps: Sequence[float], came: float) -> list[float]:
-        """Return when samples were taken by our clock [s]: not in the future, and in order.
+        """Return the capture times of samples by our clock [s]: not in the future, and in order.
 
         Args:
             stamps: Times by the phone, rising [s]; at least one.
-            came: Common arrival time by our clock [s]; not before earlier ones.
+            came: Common arrival time by our clock [s]; non-decreasing between calls.
         """
         if stamps[-1] <= self._last_stamp - RESTARTED:
             self.offset = math.inf

@@ -1,4 +1,4 @@
-"""A phone's profile: what a study can change of a phone, of how it is held, and of its app."""
+"""A phone's profile: the properties of phone, grip and app that a study can change."""
 
 from __future__ import annotations
 

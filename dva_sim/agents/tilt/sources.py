@@ -1,7 +1,7 @@
 """A phone that a person holds: tilted itself, or steered by stick, keys or gamepad on its screen.
 
-Both go through an app of the same profile. The newest source acts, whole: what the other one has
-left in its filter is forgotten. Samples come all the time; they act unless somebody holds a stick.
+Both pass through an app of the same profile. Only the newest source acts; the filter content of the
+other one is discarded. Samples arrive all the time, but act only while no stick is held.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from dva_sim.agents.tilt.given import GivenTilt
 from dva_sim.agents.tilt.measured import MeasuredTilt
 from dva_sim.agents.tilt.profile import PhoneProfile
 
-STICK_HOLDS: Final = 0.3  # design: after input by stick samples do not act for so long [s]
+STICK_HOLDS: Final = 0.3  # design: time after stick input in which samples do not act [s]
 
 
 class TiltSources:
-    """Sources of commands from whatever a person steers with.
+    """Sources of commands for all input devices of a person.
 
     Args:
         profile: Settings of reading, filter, mapping and sending.

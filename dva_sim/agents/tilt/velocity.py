@@ -1,4 +1,4 @@
-"""Speeds that a program gives in place of a tilt: they are sent as they are, when they come."""
+"""Velocities from a program instead of tilt, sent unchanged as they arrive."""
 
 from __future__ import annotations
 

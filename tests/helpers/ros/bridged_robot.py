@@ -7,7 +7,7 @@ from helpers.processes.patience import Patient
 from helpers.ros.ros_machine import RosMachine
 
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live.ros_robot import scenario_of, make_stage
+from dva_sim.live.ros_robot import make_stage, scenario_of
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.options.runs import RobotOptions
@@ -34,7 +34,9 @@ class BridgedRobot(Patient):
         options = RobotOptions(ros=machine.url, set=("request.timeout_s=0.3",))
         self.clock, self.recorder = LiveClock(), Recorder()
         self.network, self.dva = SocketNetwork(self.clock), SocketNetwork(self.clock)
-        stage = make_stage(options, scenario_of(options, profile), self.network, self.recorder, None)
+        stage = make_stage(
+            options, scenario_of(options, profile), self.network, self.recorder, None
+        )
         self.robot = RosRobot(
             stage, 1, profile, WebSocketUrl(machine.url, "--ros"), options.namespace
         )

@@ -5,13 +5,13 @@ from collections import deque
 
 import pytest
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.validation.operators import app_filters, control_loops
 from dva_sim.validation.operators.exact import MODEL_CHECKS
 
 pytestmark = pytest.mark.system
 
-LINES = lines_of(load_targets(), load_split())
+LINES = target_lines(load_targets(), load_split())
 QUICK = [check for check in MODEL_CHECKS if check != "S16b"]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.cli.validation import validate
 from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.evidence import RULE, passes, read_evidence
@@ -17,7 +17,7 @@ from dva_sim.validation.operators.experiments import (
 
 pytestmark = pytest.mark.system
 
-LINES = lines_of(load_targets(), load_split())
+LINES = target_lines(load_targets(), load_split())
 
 
 def played(strategy, *names):

@@ -10,18 +10,18 @@ from dva_sim.agents.operator.published import (
     ComparisonConfig,
     blind_lines,
     check_comparisons,
-    lines_of,
     load_history,
     load_split,
     load_targets,
     ranges,
+    target_lines,
 )
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.evidence import read_evidence
 
 _COMPARISONS = ("first", "second", "third")
-LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
+LINES = {line.id: line for line in target_lines(load_targets(), load_split())}
 
 
 def test_the_shipped_split_assigns_every_check_once():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.validation.evidence import headline, passes
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators.evidence import GROUPS, judge, rule_of, steered
@@ -21,7 +21,7 @@ from dva_sim.validation.operators.trials import (
     with_intervals,
 )
 
-LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
+LINES = {line.id: line for line in target_lines(load_targets(), load_split())}
 RULE = load_split().rule
 
 
