@@ -177,7 +177,7 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
     try_strategy(setting.strategy)  # whether there is one, is known before anything is played
     with _bar() as bar:
         exact = len(MODEL_CHECKS)
-        task = bar.add_task("exact", total=exact + operators.jobs_of(EXPERIMENTS, setting))
+        task = bar.add_task("exact", total=exact + operators.count_jobs(EXPERIMENTS, setting))
         simulated = operators.play_exact(
             list(MODEL_CHECKS), setting, lambda n: bar.update(task, completed=n)
         )

@@ -1,8 +1,8 @@
-"""One table of evidence: what is known from outside the simulation, and what a model predicts.
+"""One table of evidence: values known independently of the simulation, and predictions of a model.
 
-Each subject of a validation fills the same lines: dispatch beside theory, operators beside people,
-the network beside real sockets, and middleware beside real programs. What the lines of a subject
-have to come to together are lines of their own, in the group `RULE`.
+Each subject of a validation fills the same columns: dispatch is compared with theory, operators
+with people, the network with real sockets, and middleware with real programs. The overall criteria
+of a subject are lines of their own, in the group `RULE`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MAX_NAMED: Final = 20  # lines that miss, in a head; more would hide whether the
 
 @dataclass(frozen=True)
 class Evidence:
-    """One claim of a model, and what it is compared with.
+    """One prediction of a model, and the known value.
 
     Attributes:
         subject: Part of the simulation that makes the claim.
@@ -39,7 +39,7 @@ class Evidence:
         unit: Unit of all numbers; empty for a plain number.
         measured: Value from outside: measured, published, or exact by theory; None if only a
             band is known.
-        predicted: Value of the model; None if it says nothing.
+        predicted: Value of the model; None if it makes no prediction.
         predicted_low: Lower end of the 95 % interval of the prediction; None without chance.
         predicted_high: Upper end of that interval.
         low: Lower end of the band; None for no end.
@@ -48,7 +48,7 @@ class Evidence:
             value; False if it has to hold the prediction.
         sample: Number of events, persons or runs that the line rests on.
         verdict: Verdict; a line that is shown only is not counted.
-        note: Reason for the verdict, and what else is known.
+        note: Reason for the verdict, and further facts.
     """
 
     subject: Subject
@@ -81,7 +81,7 @@ class Evidence:
 
 
 def short_number(value: float | None) -> str:
-    """Return the four digits that count, without an exponent; a dash where there is none."""
+    """Return a value with four significant digits and no exponent; a dash without a value."""
     if value is None or value != value:
         return "–"
     if abs(value) == float("inf"):
@@ -155,7 +155,7 @@ def headline(lines: Sequence[Evidence]) -> str:
 
 
 def count_of(lines: Iterable[Evidence]) -> str:
-    """Return the number of lines that hold, and of all that have a verdict."""
+    """Return the number of lines that hold, and the number of lines with a verdict."""
     verdicts = [line.verdict for line in judged(lines)]
     rough = verdicts.count("too rough")
     more = f", {rough} are too rough to say" if rough else ""
@@ -163,7 +163,7 @@ def count_of(lines: Iterable[Evidence]) -> str:
 
 
 def names_of_misses(lines: Iterable[Evidence]) -> list[str]:
-    """Return names of all lines that miss, measures of one condition together."""
+    """Return the names of all lines that miss, with the measures of a condition together."""
     names: dict[str, list[str]] = {}
     for line in judged(lines):
         if line.verdict == "misses":
@@ -182,9 +182,9 @@ def state_of_rule(lines: Iterable[Evidence]) -> str:
 
 
 def _shortfall(line: Evidence) -> str:
-    note = f", {line.note}" if line.note else ""
+    remark = f", {line.note}" if line.note else ""
     target = _range(line.low, line.high)
-    return f"{line.line} ({short_number(line.predicted)}{note}; asked for: {target})"
+    return f"{line.line} ({short_number(line.predicted)}{remark}; asked for: {target})"
 
 
 def read_evidence(path: Path) -> list[Evidence]:

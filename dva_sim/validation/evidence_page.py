@@ -1,4 +1,4 @@
-"""Result of a validation: its evidence, and the page and tables written of it."""
+"""Result of a validation: its evidence, and its page and tables."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from dva_sim.validation.evidence import (
 from dva_sim.validation.frame import Row
 
 NAME: Final = "evidence"
-LONG: Final = 40  # lines; of longer groups a terminal shows those that do not hold
+LONG: Final = 40  # lines; of a longer group a terminal only shows the failures
 TITLES: Final[dict[Subject, str]] = {
     "dispatch": "Dispatch beside theory",
     "operators": "Operators beside people",
@@ -69,7 +69,7 @@ class ValidationResult:
         lines: Evidence of one subject, with the lines of its rule.
         notes: Notes on the headline, one sentence each.
         conditions: Conditions of the validation, by name.
-        sheets: Tables of what no line of evidence can say.
+        sheets: Further tables, for facts outside of the evidence.
         tables: Further tables to write: rows by name, each row with the same keys.
         draw: Draws further figures, which takes a while.
     """
@@ -153,7 +153,7 @@ def sheets_of(lines: Sequence[Evidence], most: int | None = None) -> list[Result
 
 
 def _sheet(title: str, lines: Sequence[Evidence], most: int | None) -> ResultSheet:
-    """Return the lines of a group; a row of one cell is the source of those below it."""
+    """Return the rows of a group; a row of one cell is the source of the rows below it."""
     printed = lines
     text = ""
     if most is not None and len(lines) > most:
@@ -232,7 +232,7 @@ def _write_parquet(path: Path, rows: Sequence[Row]) -> None:
 
 
 def _kind(rows: Sequence[Row], name: str) -> str:
-    """Return the type of a column, by its first value that is there."""
+    """Return the type of a column, by its first present value."""
     values = (row[name] for row in rows if row[name] is not None)
     return _KINDS[type(next(values, 0.0))]
 

@@ -1,4 +1,4 @@
-"""The one figure of all evidence: predicted over measured, with the band of each line."""
+"""The figure of all evidence: predicted over measured values, with the band of each line."""
 
 from __future__ import annotations
 

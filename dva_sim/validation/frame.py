@@ -28,7 +28,7 @@ def job_of(
         seed: Random seed.
         scenario: Scenario to run; a job without one has everything in `asked`.
         person: Person of the job.
-        asked: Further input of its program.
+        asked: Further input for the program of the job.
     """
     return StudyJob(
         part=name,

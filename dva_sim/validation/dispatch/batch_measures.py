@@ -40,20 +40,20 @@ class Sample:
     Attributes:
         streams: Names of the classes of events.
         units: Names of the responders.
-        groups: Name of each responder's group.
-        kinds: `guard` or `robot`, of each responder.
+        groups: Name of the group of each responder.
+        kinds: Kind of each responder, `guard` or `robot`.
         operators: Number of operators.
         sources: Number of sources, if finite.
         begins: Start of the measurement.
         ends: End of the measurement: no event after this.
         stream: Class of each event, a place in `streams` `(n,)`.
-        unit: Unit that served it, an index into `units`; `NOBODY` if none `(n,)`.
+        unit: Index in `units` of the unit that served it; `NOBODY` if none `(n,)`.
         outcome: `confirmed`, `contained`, `refuted`, `escalated`, `expired` or `open` `(n,)`.
         detected: `(n,)`
         assigned: `(n,)`
         arrived: `(n,)`
         confirmed: Time at which the responder was sure, one way or the other `(n,)`.
-        act_assigned: Time at which somebody was sent to contain it `(n,)`.
+        act_assigned: Time at which a unit was sent to contain it `(n,)`.
         act_arrived: `(n,)`
         closed: `(n,)`
         busy_unit: Busy unit, an index into `units` `(m,)`.
@@ -95,7 +95,7 @@ class Sample:
 
     @property
     def served(self) -> NDArray[np.bool_]:
-        """Events that somebody went to and settled."""
+        """Events that a unit went to and settled."""
         return np.isin(self.outcome, ("confirmed", "contained", "refuted"))
 
 
@@ -201,12 +201,12 @@ def many_servers(times: Floats, services: Floats, servers: int) -> Floats:
 
 
 def one_server(times: Floats, services: Floats, ranks: Ints) -> Floats:
-    """Return waits at one server that goes by rank, and within a rank by who came first.
+    """Return waits at one server that serves by rank, and within a rank in order of arrival.
 
     Args:
         times: Arrival times, ascending `(n,)`.
         services: `(n,)`
-        ranks: The lowest is served first; nobody is interrupted `(n,)`.
+        ranks: Ranks, of which the lowest is served first, without interruption `(n,)`.
     """
     came = times.tolist()
     takes = services.tolist()
@@ -229,8 +229,8 @@ def one_server(times: Floats, services: Floats, ranks: Ints) -> Floats:
 
 Sums = tuple[Floats, Floats]  # tops and bottoms, one for each batch
 
-OPERATORS = "operators"  # as if they were a group; each robot that is out has one
-_ROUNDING = 1e-9  # a wait shorter than this is none [s]
+OPERATORS = "operators"  # group of operators, one for each robot on an errand
+_ROUNDING = 1e-9  # a wait shorter than this counts as zero [s]
 
 
 class Batches:
@@ -287,7 +287,7 @@ def check_name(name: str, scenario: TimedScenario) -> None:
     """Refuse the name of a measure that there is not, or not in this scenario.
 
     Raises:
-        ConfigError: with what would be right.
+        ConfigError: the name is unknown.
     """
     word, stroke, detail = name.partition("/")
     if stroke:
@@ -334,7 +334,7 @@ def _between(first: str, second: str) -> Callable[[Sample], tuple[Floats, Events
 
 
 def _wait_of_all(sample: Sample) -> tuple[Floats, Events]:
-    """Return the wait for somebody, or until nobody was needed any more."""
+    """Return the wait for a unit, or until none was needed."""
     gone = np.where(np.isnan(sample.assigned), sample.closed, sample.assigned)
     return gone - sample.detected, np.ones(len(gone), dtype=bool)
 
@@ -398,7 +398,7 @@ def _resting(batches: Batches) -> Sums:
 
 
 def _total(batches: Batches) -> Sums:
-    """Return ways to all events that were detected at one moment, added up."""
+    """Return the sum of the path lengths to events that were detected at the same time."""
     sample = batches.sample
     first = np.diff(sample.detected, prepend=-np.inf) > 0
     return batches.total(sample.arrived - sample.assigned, sample.served), batches.count(first)

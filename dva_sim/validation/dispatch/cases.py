@@ -1,6 +1,6 @@
 """Cases: worlds that theory has an exact answer for, written down in a file.
 
-A case says what is played (a timed scenario), which formula knows the answer, where the
+A case defines the timed scenario to play, the formula for the answer, where the
 formula's parameters stand in the scenario, and what is compared. Other numbers, or other
 worlds of the same families, need no programming: only another file.
 """
@@ -108,7 +108,7 @@ def _item(items: tuple[Any, ...], step: str) -> Any:
 
 
 def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
-    """Return the value as the parameter wants it: a law, its mean, or its rate."""
+    """Return the value in the form of the parameter: a law, its mean, or its rate."""
     if key == "preferences" and isinstance(value, dict):
         return _preferences(value, scenario)
     if isinstance(value, list):
@@ -128,14 +128,14 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
 
 
 def _checked(key: str, hint: Any, value: Any, original: Any) -> Any:
-    """Return a parameter, if it is of the kind that the formula wants."""
+    """Return a parameter after checking its type for the formula."""
     if _wants_law(hint):
         return value
     return _valid(TypeAdapter(hint), value, f"{key} {original!r} does not fit")
 
 
 def _valid(adapter: TypeAdapter[A], value: Any, wrong: str) -> A:
-    """Return the value as an annotation wants it; else what is wrong, and the first reason."""
+    """Return the value in the type of an annotation; otherwise the mistake and its reason."""
     try:
         return adapter.validate_python(value)
     except ValidationError as error:
@@ -182,7 +182,7 @@ class CaseConfig(Config):
         loosely: Measures without a required precision: they only have to agree.
         runs: Seeds; each is a whole run of the scenario.
         quick_runs: Number of runs with `--quick`.
-        batches: Parts of equal length that the measured time of each run is cut into.
+        batches: Number of equal parts of the measured time of each run.
     """
 
     title: str
@@ -219,15 +219,15 @@ class Case(Config):
     """One case, ready to be played.
 
     Attributes:
-        name: Its key in the file.
+        name: Key of the case in the file.
         title: Title in words.
         source: Source of the exact values.
         scenario: Scenario to simulate.
         exact: The exact value of each measure.
-        loosely: Those of them that no precision is asked for.
+        loosely: Measures without a required precision.
         runs: Seeds.
         quick_runs: Number of runs with `--quick`.
-        batches: Parts of each run.
+        batches: Number of parts of each run.
     """
 
     name: str

@@ -87,7 +87,7 @@ def check_cases(
 
 
 def play(job: StudyJob) -> Tables:
-    """Return one run: tops and bottoms of each measure, and the controls, one row per batch."""
+    """Play one run; return numerator and denominator of each measure, and controls, by batch."""
     scenario = cast(TimedScenario, job.scenario)
     levels = job.levels
     sample = sample_of(simulate_timed(scenario, job.seed))
@@ -174,10 +174,7 @@ def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns
 
 
 def _compare(case: Case, columns: Columns) -> list[Evidence]:
-    """Return all that a case is judged by.
-
-    Results, what was put in, and what must hold in any case.
-    """
+    """Return all lines that judge a case: its results, its inputs, and general identities."""
     variates = [values for name, values in columns.items() if name.startswith("control ")]
     controls = np.column_stack(variates) if variates else None
     comparisons = [

@@ -47,13 +47,13 @@ from dva_sim.validation.dispatch.queues import LawMoments, gm1
 from dva_sim.validation.dispatch.transforms import laplace
 from dva_sim.validation.evidence import Verdict
 
-ERRORS = 3.0  # an estimate may be so many standard errors off
-TOLERANCE = 0.005  # or so much, as a share of the exact value
-PRECISION = 0.01  # standard error asked for, as a share of the exact value
-KNOWN_SPREAD_BATCHES = 100  # batches whose own spread is known well enough
+ERRORS = 3.0  # allowed deviation of an estimate, in standard errors
+TOLERANCE = 0.005  # allowed deviation, as a share of the exact value
+PRECISION = 0.01  # required standard error, as a share of the exact value
+KNOWN_SPREAD_BATCHES = 100  # number of batches from which their spread counts as known
 _FOLDS = 10
-_BATCHES_PER_CONTROL = 5  # with fewer, weights are noise
-_ROUNDING = 1e-9  # what arithmetic alone may cost
+_BATCHES_PER_CONTROL = 5  # minimum batches per control; with fewer, weights are noise
+_ROUNDING = 1e-9  # tolerance for rounding errors
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ class Estimate:
 
     Attributes:
         value: The estimate.
-        error: Its standard error.
+        error: Standard error of the value.
         plain: Value without control variates.
-        plain_error: Its standard error.
+        plain_error: Standard error of the plain value.
         batches: Number of batches.
     """
 
@@ -99,12 +99,12 @@ def certain(value: float) -> Estimate:
 
 
 def adjusted(values: Floats, controls: Floats) -> Floats:
-    """Return the values without what the controls explain, by weights from other batches.
+    """Return the values minus the part explained by controls, with weights from other batches.
 
     Args:
         values: One per batch `(n,)`.
-        controls: With mean zero, the most telling first `(n, k)`; those there are too few
-            batches for are left out.
+        controls: Controls of mean zero, the most informative first `(n, k)`; the last ones are left
+            out if there are too few batches.
     """
     spread = controls.std(axis=0)
     useful = controls[:, spread > _ROUNDING * (abs(controls).max(axis=0) + _ROUNDING)]
@@ -112,14 +112,15 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     if not useful.shape[1]:
         return values
     useful = useful / useful.std(axis=0)
-    left = np.empty_like(values)
+    adjusted_values = np.empty_like(values)
+    # Cross-fitted: weights from the same batches would bias the estimate.
     for fold in np.array_split(np.arange(len(values)), _FOLDS):
-        others = np.ones(len(values), dtype=bool)
-        others[fold] = False
-        around = np.column_stack([np.ones(others.sum()), useful[others]])
-        weights = np.linalg.lstsq(around, values[others], rcond=None)[0][1:]
-        left[fold] = values[fold] - useful[fold] @ weights
-    return left
+        is_other = np.ones(len(values), dtype=bool)
+        is_other[fold] = False
+        around = np.column_stack([np.ones(is_other.sum()), useful[is_other]])
+        weights = np.linalg.lstsq(around, values[is_other], rcond=None)[0][1:]
+        adjusted_values[fold] = values[fold] - useful[fold] @ weights
+    return adjusted_values
 
 
 def verdict(estimated: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
@@ -128,7 +129,7 @@ def verdict(estimated: Estimate, exact: float, precision: float | None = PRECISI
     Args:
         estimated: The estimate.
         exact: Exact value.
-        precision: Standard error asked for, as a share of the exact value; None asks for none.
+        precision: Required standard error, as a share of the exact value; None if not required.
 
     Returns:
         `misses`: outside its band, with controls or without them. `too rough`: the standard error
@@ -156,7 +157,7 @@ def half_band(error: float, exact: float, batches: int) -> float:
     Args:
         error: Standard error of the estimate.
         exact: Exact value.
-        batches: Number of batches that the standard error comes from.
+        batches: Number of batches behind the standard error.
     """
     return max(_errors_allowed(batches) * error, TOLERANCE * abs(exact), _rounding(exact))
 
@@ -192,7 +193,7 @@ def _error(values: Floats) -> float:
 
 
 FADING = (3.0, 10.0, 30.0, 100.0)  # [events]
-FASTER = 0.95  # what the one server beside one responder takes of its time
+FASTER = 0.95  # relative service time of the second, faster control queue
 
 
 def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
@@ -243,7 +244,7 @@ def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats,
 def _transforms(
     batches: Batches, parts: list[tuple[Law, Floats, NDArray[np.bool_]]]
 ) -> tuple[Floats, Floats]:
-    """Sum of exp(-time / mean) over some times, and what their laws let expect of it."""
+    """Sum of exp(-time / mean) over some times, and its expectation under their laws."""
     seen = expected = np.zeros(len(batches.lengths))
     for law, times, which in parts:
         seen = seen + batches.total(np.exp(-times / law.mean), which)
@@ -281,7 +282,7 @@ def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 def _look_law_of(
     sample: Sample, scenario: TimedScenario
 ) -> Iterator[tuple[Law, NDArray[np.bool_]]]:
-    """Yield each law of looking, and which of the events that were looked at it is the law of."""
+    """Yield each law of looking times, with a mask of the inspected events that follow it."""
     groups = {group.name: group.look for group in scenario.responders}
     for number, stream in enumerate(scenario.demand):
         for unit, group in enumerate(sample.groups):
@@ -290,7 +291,7 @@ def _look_law_of(
 
 
 def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
-    """Return excess of each look over its mean, and of its square; 0 where nobody looked."""
+    """Return the excess of each look over its mean, and of its square; 0 without a look."""
     surplus = np.zeros(len(sample.stream))
     square = np.zeros(len(sample.stream))
     took = sample.confirmed - sample.arrived
@@ -326,7 +327,7 @@ def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 
 
 def _ranks(scenario: TimedScenario) -> list[int]:
-    """Return the place of each stream, the most severe first."""
+    """Return the rank of each stream, the most severe first."""
     severities = [stream.severity for stream in scenario.demand]
     levels = sorted({s for s in severities if isinstance(s, float)}, reverse=True)
     return [levels.index(s) if isinstance(s, float) else 0 for s in severities]

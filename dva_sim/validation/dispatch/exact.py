@@ -1,4 +1,4 @@
-"""Exact answers by name: one waiting line, units with preferences, priorities, ways in a square.
+"""Exact answers by name: one queue, units with preferences, priorities, paths in a square.
 
 Distinct units, each call with its own list of preferred units (the hypercube); a fixed
 number of machines that need somebody from time to time, such as robots and their operators; the
@@ -52,14 +52,14 @@ def hypercube(
     mean_service_s: Memoryless | Sequence[Memoryless],
     queue: Literal["infinite", "none"] = "infinite",
 ) -> Measures:
-    """Return workloads and who serves whom, from the Markov chain of all sets of busy units.
+    """Return workloads and shares of service, from the Markov chain of all sets of busy units.
 
     A call goes to the first free unit on its class's list, each list naming all units. If
     none is free it waits (first come, first served, whatever the class) or is lost.
 
     Args:
         arrival_rates: Arrival rate of each class of calls [1/s].
-        preferences: For each class its units, best first, counted from 1.
+        preferences: Units of each class, best first, counted from 1.
         mean_service_s: Mean service time of all units, or of each unit.
         queue: `infinite`, or `none` for loss.
 
@@ -241,7 +241,7 @@ def _by_class(ahead: float, rates: Sequence[float], loads: Sequence[float]) -> M
     return measures | {"wait_s": overall, "utilisation": above}
 
 
-_NODES = 32  # of Gauss-Legendre in each direction and piece; 48 change the ninth digit
+_NODES = 32  # Gauss-Legendre nodes per direction and piece; 48 change the ninth digit
 
 # Mean distance from the centre of a unit square: (sqrt 2 + ln(1 + sqrt 2)) / 6.
 CENTRE = (math.sqrt(2) + math.log(1 + math.sqrt(2))) / 6

@@ -104,7 +104,7 @@ def _choice(
 Deviations = Iterator[tuple[str, float]]
 """Quantities checked, and their distance from the right value: always 0."""
 
-SLACK_S = 1e-3  # what the clock's whole microseconds may add up to
+SLACK_S = 1e-3  # tolerance for the sum of the clock's rounding errors [s]
 TIMES = ("detected", "assigned", "departed", "arrived", "confirmed", "closed")
 FACTOR = 8
 
@@ -128,7 +128,7 @@ for _stream in _PLACES["demand"]:
 
 
 def check_identity(name: str, seed: int) -> list[tuple[str, float]]:
-    """Look at one of `IDENTITIES`: what was looked at, and how far off it is.
+    """Check one of `IDENTITIES`; return the number of checks and the deviation.
 
     Args:
         name: Name of the identity.
@@ -156,7 +156,7 @@ def _first_come_first_served(seed: int) -> Deviations:
 
 
 def _conservation(seed: int) -> Deviations:
-    """Count events that are not closed in one way and one only."""
+    """Count events that do not have exactly one end."""
     scenario = copy.deepcopy(_PLACES)
     scenario["responders"][0] |= {"kind": "robot"}
     scenario["operators"] = {"count": 1}
@@ -220,7 +220,7 @@ def _best_of_all(seed: int) -> Deviations:
 
 
 def _oracle(seed: int) -> Deviations:
-    """Compare sums of responses with those of who knows the future."""
+    """Compare sums of responses with those of a clairvoyant policy."""
     scenario = _PLACES | {"max_events": 6, "horizon_s": 10_000, "drain": False}
     scenario["responders"] = [g | {"after": "return"} for g in _PLACES["responders"][:2]]
     scenario["demand"] = [

@@ -1,4 +1,4 @@
-"""One waiting line, one or more servers: what queueing theory says of it, exactly.
+"""One queue with one or more servers: exact results of queueing theory.
 
 A server is a responder or an operator, a customer an event. Every formula takes rates per
 second and times in seconds, and gives its measures by name:
@@ -47,7 +47,7 @@ class DurationLaw(Protocol):
 
 
 class LawMoments(NamedTuple):
-    """A law of which only these matter; see `DurationLaw`."""
+    """Properties of a law that the formulas need; see `DurationLaw`."""
 
     mean: float
     second: float
@@ -60,7 +60,7 @@ def _usual(utilisation: float, delayed: float, wait_s: float, service_s: float) 
 
 
 def erlang_b(servers: int, load: float) -> float:
-    """Return the probability that all servers are busy if nobody waits.
+    """Return the probability that all servers are busy, without a queue.
 
     Args:
         servers: Number of servers.
@@ -76,7 +76,7 @@ def erlang_b(servers: int, load: float) -> float:
 
 
 def erlang_c(servers: int, load: float) -> float:
-    """Return the probability of having to wait if everybody waits; needs `load < servers`.
+    """Return the probability of waiting with an unlimited queue; needs `load < servers`.
 
     References:
         Gross et al. (2008), chapter 2 (several servers).
@@ -89,7 +89,7 @@ def erlang_c(servers: int, load: float) -> float:
 def mmc(
     arrival_rate: float, mean_service_s: Memoryless, servers: int, at_s: Sequence[float] = ()
 ) -> Measures:
-    """Return M/M/c: random arrivals, exponential service, everybody waits, first come first served.
+    """Return M/M/c: Poisson arrivals, exponential service, unlimited queue, order of arrival.
 
     Beside the usual measures: `wait_50_s`, `wait_90_s` and `wait_95_s`, quantiles of the wait
     of all customers (0 for those who need not wait), and `beyond_T`, the share that waits
@@ -110,7 +110,7 @@ def mmc(
 
 
 def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
-    """Return M/G/c/c: who finds all servers busy is lost; only the mean of the service matters.
+    """Return M/G/c/c: customers who find all servers busy are lost; only mean service matters.
 
     References:
         A. K. Erlang (1917); insensitivity: B. A. Sevastyanov, Theory Probab. Appl. 2 (1957)
@@ -139,7 +139,7 @@ def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: 
 
 
 def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
-    """Return M/G/1: one server, any law of service, everybody waits.
+    """Return M/G/1: one server, any law of service, unlimited queue.
 
     References:
         F. Pollaczek (1930), A. Khinchine (1932); Kleinrock (1975), eq. (5.113).
@@ -169,7 +169,7 @@ def gm1(between: distributions.Law, mean_service_s: Memoryless) -> Measures:
 def erlang_a(
     arrival_rate: float, mean_service_s: Memoryless, servers: int, mean_patience_s: Memoryless
 ) -> Measures:
-    """Return M/M/c+M: who waits gives up after an exponential time.
+    """Return M/M/c+M: waiting customers give up after an exponential time.
 
     Beside the usual measures: `abandoned`, share of all customers who give up, and
     `wait_all_s`, mean wait of all customers, who gave up included.
@@ -181,7 +181,7 @@ def erlang_a(
     """
     rate = 1 / mean_service_s
     impatience = 1 / mean_patience_s
-    # Beyond so long a queue, leaving is likelier by far.
+    # Longer queues have a negligible probability: customers leave much faster.
     balance = max(0.0, (arrival_rate - rate * servers) / impatience)
     most = int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
     inside = np.arange(servers + most + 1)
@@ -189,7 +189,7 @@ def erlang_a(
     deaths = busy * rate + (inside - busy) * impatience
     chance = birth_death(np.full(len(inside) - 1, arrival_rate), deaths[1:])
     abandoned = float(chance @ (inside - busy)) * impatience / arrival_rate
-    rank = np.arange(1, most + 2)  # of who arrives when all servers are busy
+    rank = np.arange(1, most + 2)  # position in the queue on arrival when all servers are busy
     served = servers * rate / (servers * rate + rank * impatience)
     until = np.cumsum(1 / (servers * rate + rank * impatience))
     wait = float(chance[servers:] @ (served * until)) / (1 - abandoned)
@@ -208,7 +208,7 @@ def tandem(
     """Return two M/M/c in a row: the second sees random arrivals, as if the first were not there.
 
     Measures carry the number of their station: `wait_1_s`, `wait_2_s`, `utilisation_1`, ...;
-    `stay_s` is the whole way through.
+    `stay_s` is the time through all stations.
 
     References:
         P. J. Burke, Oper. Res. 4 (1956) 699-704; J. R. Jackson, Oper. Res. 5 (1957) 518-521.
@@ -230,6 +230,6 @@ def birth_death(births: Floats, deaths: Floats) -> Floats:
 
 
 def require_stable(load: float, who: str = "servers") -> None:
-    """Refuse a load [share of what they can do] that no stationary state belongs to."""
+    """Reject a load [share of capacity] without a stationary state."""
     if not load < 1:
         raise ValueError(f"the {who} are offered {load:g} of what they can do; below 1 is stable")

@@ -41,14 +41,14 @@ def laplace(law: distributions.Law, s: float) -> float:
 
 
 def _over_normal(law: distributions.Lognormal, s: float) -> float:
-    """Return the mean over a standard normal number, whose exponential the time is."""
+    """Return the mean over a standard normal number, of which the time is the exponential."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
     times = law.median * np.exp(law.spread * nodes)
     return float(weights @ np.exp(-s * times) / weights.sum())
 
 
 def _over_exponential(law: distributions.Weibull, s: float) -> float:
-    """Return the mean over a unit exponential number, a power of which the time is."""
+    """Return the mean over a unit exponential number, of which the time is a power."""
     scale = law.mean_s / math.gamma(1 + 1 / law.shape)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     ends = np.array([0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64])

@@ -1,4 +1,4 @@
-"""The whole comparison: which runs of the model it takes, and what they come to."""
+"""The whole comparison: the runs of the model that it needs, and their results."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from dva_sim.validation.network.verdicts import (
     ConditionGroup,
     ConditionKind,
     Row,
-    cells_of,
+    compare_cells,
     judge,
 )
 
-CHUNK = 10  # runs of one job
+CHUNK = 10  # number of runs in a job
 KEPT = tuple(name for name in NUMBERS if name in RESULTS)
 
 
@@ -107,17 +107,17 @@ def _effort(job: StudyJob) -> float:
     return count * float(row["hz"]) * float(row["dur_s"])
 
 
-RUNS = 200  # of a condition under loss
-QUICK_RUNS = 40  # of a condition under loss
+RUNS = 200  # number of runs of a condition under loss
+QUICK_RUNS = 40  # the same in a quick validation
 CONTROL_RUNS = 50
 QUICK_CONTROL_RUNS = 20
-JITTER_RUNS = 20  # where nothing is lost, but delays are left to chance
+JITTER_RUNS = 20  # number of runs of a condition with random delays and no loss
 MODEL = "the model"
 CONTROLS: dict[str, Depth] = {
     "message by message": "message",
     "datagrams": "datagram",
 }
-"""Models that are too simple, and must be found out."""
+"""Models that are too simple, and must be rejected."""
 
 Rows = dict[ModelRuns, list[Row]]
 
@@ -189,7 +189,7 @@ class NetworkComparison:
 
     @property
     def variants(self) -> dict[str, Pooled]:
-        """The model as it is, what is too simple, and with a mechanism left out."""
+        """The full model, the oversimplified ones, and those without a mechanism."""
         return {"nothing": self.pooled, **self.controls, **self.ablated}
 
     @property
@@ -226,7 +226,7 @@ def compare(
     own = [c for c in cells if c.group.kind == "pooled"]
     pooled = pool(to_be_pooled(own), Streams(setting.seed).fresh("null"))
     comparisons = {
-        name: pool_variant(pooled, _cells(pooled_of(played), variant, rows))
+        name: pool_variant(pooled, _cells(find_pooled(played), variant, rows))
         for name, variant in orders.items()
     }
     return NetworkComparison(
@@ -244,7 +244,7 @@ def orders_of(
     groups: Sequence[ConditionGroup], setting: NetworkSetting
 ) -> dict[str, list[ModelRuns]]:
     """Model runs to make: full model, oversimplified controls, and ablations."""
-    pooled = pooled_of(groups)
+    pooled = find_pooled(groups)
     runs = setting.control_runs
     orders = {MODEL: [ModelRuns(g.condition, setting.runs(g)) for g in groups]}
     for name, depth in CONTROLS.items() if pooled else ():
@@ -254,7 +254,7 @@ def orders_of(
     return orders
 
 
-def pooled_of(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
+def find_pooled(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
     """Return the conditions that are pooled."""
     return [group for group in groups if group.kind == "pooled"]
 
@@ -274,5 +274,7 @@ def _cells(
     groups: Sequence[ConditionGroup], orders: Sequence[ModelRuns], rows: Rows
 ) -> list[ComparedCell]:
     return [
-        c for group, own in zip(groups, orders, strict=True) for c in cells_of(group, rows[own])
+        c
+        for group, own in zip(groups, orders, strict=True)
+        for c in compare_cells(group, rows[own])
     ]

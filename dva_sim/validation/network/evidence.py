@@ -138,7 +138,7 @@ def _finite(value: float) -> float | None:
 
 
 def rule_of(comparison: NetworkComparison) -> Iterator[Evidence]:
-    """Yield the rule for all lines: shares inside, pooled runs together, and models found out."""
+    """Yield the overall criteria: shares inside, pooled runs together, and rejected models."""
     if not comparison.judged:
         return
     for kind in KINDS:
@@ -199,7 +199,7 @@ def _rule_of_pooled(pooled: Pooled) -> Iterator[Evidence]:
 
 
 def notes(comparison: NetworkComparison) -> list[str]:
-    """Return notes on what is judged, on missing conditions and on findings."""
+    """Return notes on the judged lines, on missing conditions and on findings."""
     judged = comparison.judged
     counts = ", ".join(
         f"{sum(g.kind == kind for g in judged)} {words}"

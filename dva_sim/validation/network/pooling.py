@@ -35,7 +35,7 @@ MAX_BIAS = 0.05  # median over conditions
 MAX_TAIL_BIAS = 0.10  # median over conditions, of the tails of ages
 MIN_EVENTS = 5  # fewer time-outs or alerts than this, expected in all runs, tell nothing
 MIN_CONDITIONS = 10  # fewer have no median to speak of
-MIN_SHARE = 0.9  # of the model's runs in which a measure must be defined
+MIN_SHARE = 0.9  # minimum share of the model's runs in which a measure is defined
 DRAWS = 1000
 
 
@@ -61,7 +61,7 @@ class Pooled:
     """Result of all pooled conditions.
 
     Attributes:
-        scored: Each measure of each condition.
+        scored: Scores of each measure of each condition.
         significant: Those that are after Holm's correction for their number.
         rms: Root mean square of z.
         expected: The range in which 95 of 100 of them would lie if the model were right.

@@ -1,4 +1,4 @@
-"""The model plays a condition with what every run is made of: its network, requester and queue.
+"""Plays a condition with the components of every run: network, requester and queue.
 
 Both programs are those that are measured (`dva_sim.network.workload`); the robot's takes one
 command at a time from its queue. A run ends with the last command: as soon as the next one would
@@ -60,7 +60,7 @@ next arrival would fall on the same moment."""
 Depth = Literal["auto", "message", "segment", "datagram"]
 Played = Literal["message", "segment", "datagram"]
 
-_PATIENCE_S = 120.0  # for a handshake; then nothing is ever sent
+_PATIENCE_S = 120.0  # maximum duration of a handshake; without it nothing is sent [s]
 LATE_S = 0.0001
 """Median lateness of packets at the emulated link, by its own account [s].
 
@@ -177,7 +177,7 @@ class PredictedRun:
         self._operator = operator_of(condition, self._network, form, self._note)
 
     def play(self) -> RunLog:
-        """Let time pass until the operator's program has ended; the log up to then."""
+        """Run until the operator's program has ended; return the log."""
         if not self._condition.wait_hs:
             self._begin()
         while self._operator.ended is None and (self._is_begun or self._clock.now < _PATIENCE_S):

@@ -36,7 +36,7 @@ class SourceConfig(Config):
 
     Attributes:
         file: CSV file, beside the document or by path.
-        made_with: Versions of what it was made with, and the machine.
+        made_with: Versions of libraries and kernel, and the machine.
         independent: Groups of runs with independent random numbers. The others share one seed, so
             nothing can be concluded from them under loss. By default all are independent.
         realtime: True if the emulated link had real-time priority where the table does not say.
@@ -173,7 +173,7 @@ class PlanConfig(Config):
 
     @property
     def sources(self) -> dict[str, SourceConfig]:
-        """The tables there are, by name."""
+        """Tables by name."""
         own = {"own": self.own.table} if self.own.table is not None else {}
         return {"reference": self.reference} | own
 

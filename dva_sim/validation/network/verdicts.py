@@ -22,17 +22,17 @@ from dva_sim.validation.network.reference import SocketRun
 ConditionKind = Literal["lossless", "overload", "single", "pooled"]
 KINDS: tuple[ConditionKind, ...] = ("lossless", "overload", "single", "pooled")
 
-OVERLOAD = 0.95  # from this load on, queues grow
+OVERLOAD = 0.95  # load above which queues grow
 POOLED_SEEDS = 6
 PACKET_BYTES = 61  # IPv4, TCP with time stamps, and ZMTP's frame header [B]
 
 
 @dataclass(frozen=True)
 class ConditionGroup:
-    """All runs of one condition that are looked at together.
+    """All runs of one condition that are judged together.
 
     Attributes:
-        kind: By which band it is judged.
+        kind: Kind of band for judging it.
         runs: The runs.
         left_out: Reason why it is not judged at all; empty if it is.
     """
@@ -82,7 +82,7 @@ def why_not_judged(condition: Condition) -> str:
 
 
 def load(condition: Condition) -> float:
-    """Return the share of what the robot and the link can do that is asked of them.
+    """Return the load of robot and link, as a share of their capacity.
 
     A requester waits for its reply, so it asks too much only of a robot that needs longer
     than the time-out: requests then come at that pace.
@@ -125,7 +125,7 @@ class ComparedMeasure:
     """One thing that is compared.
 
     Attributes:
-        name: Its column.
+        name: Column of the measure.
         words: Description of the measure.
         unit: Unit of its values.
     """
@@ -186,7 +186,7 @@ class ComparedCell:
     """One measure of one condition, measured and predicted.
 
     Attributes:
-        group: The condition with what was measured.
+        group: Condition with its measured runs.
         measured: A value for each run on sockets, without those that are not defined.
         predicted: Predicted values, run by run.
     """
@@ -198,12 +198,12 @@ class ComparedCell:
 
     @property
     def real(self) -> float:
-        """Mean of what was measured."""
+        """Mean of the measured values."""
         return float(self.measured.mean()) if len(self.measured) else math.nan
 
     @property
     def model(self) -> float:
-        """Mean of what was predicted."""
+        """Mean of the predicted values."""
         return float(self.predicted.mean()) if len(self.predicted) else math.nan
 
     @property
@@ -212,7 +212,7 @@ class ComparedCell:
         return self.model / self.real - 1 if self.real else math.nan
 
 
-def cells_of(group: ConditionGroup, predicted: Sequence[Row]) -> list[ComparedCell]:
+def compare_cells(group: ConditionGroup, predicted: Sequence[Row]) -> list[ComparedCell]:
     """Return every measure of a condition that is defined on either side.
 
     Time-outs and alerts are a requester's.
@@ -233,7 +233,7 @@ CellWord = Literal["inside", "outside", "shown only"]
 
 SHARES: dict[ConditionKind, float] = {"lossless": 0.05, "overload": 0.10, "pooled": 0.05}
 """Half-widths of bands; of pooled conditions, where runs hardly differ."""
-BOUNDED_SHARE = 0.15  # of an overload with bounded buffers
+BOUNDED_SHARE = 0.15  # half-width of the band under overload with bounded buffers
 TIME_MS = 2.0  # added to the share
 RATE_HZ = 0.05  # added to the share
 NOT_REALTIME_MS = 10.0  # added for 95th percentiles without real-time priority
@@ -302,7 +302,7 @@ def reason_against(cell: ComparedCell) -> str:
 
 
 def _band(cell: ComparedCell) -> tuple[float, float]:
-    """Return the band around what was measured."""
+    """Return the band around the measured value."""
     group = cell.group
     measure = cell.measure
     real = cell.real
@@ -323,7 +323,7 @@ def _absolute(cell: ComparedCell) -> float:
 
 
 def _interval(cell: ComparedCell) -> tuple[float, float]:
-    """Return the 95 % prediction interval of one run, made wider.
+    """Return the widened 95 % prediction interval of one run.
 
     Empty where nothing is predicted.
     """

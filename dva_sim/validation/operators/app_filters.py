@@ -17,7 +17,7 @@ COPY = "median20-copy"
 IN_PLACE = "median20-inplace"
 STEP_LOOK = 0.2  # [s]
 STEP_LEVELS = [2.0] * 102 + [8.0] * 102 + [2.0] * 204  # 3 s, 3 s, 6 s
-BATCHES = 20_000  # of noise
+BATCHES = 20_000  # number of batches of noise
 
 
 def ages() -> Values:
@@ -52,7 +52,7 @@ def smoothing(seed: int) -> Values:
 
 
 def _mean_age(filter_: Filter, longest: float) -> float:
-    """Return the mean age on a ramp of one per second, over whole periods between two looks [s]."""
+    """Return the mean age on a ramp of 1 per second, over whole periods between two reads [s]."""
     samples = [n / RATE for n in range(1, round(40 * RATE) + 1)]
     values = _outputs(filter_, samples, longest)
     period = _period(longest)
@@ -77,5 +77,5 @@ def _outputs(filter_: Filter, samples: list[float], longest: float) -> list[floa
 
 
 def _period(longest: float) -> float:
-    """Return the period between two looks [s]."""
+    """Return the period between two reads of the filter [s]."""
     return min(longest, BATCH / RATE)

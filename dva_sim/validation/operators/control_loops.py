@@ -1,4 +1,4 @@
-"""Delayed loops on their own: where they become unstable, and what a prediction makes of one.
+"""Delayed loops on their own: their stability limit, and the effect of a prediction on it.
 
 The strategies close the loops themselves, stepped in time; theory is only what they are compared
 with. The person who steers is the one in the middle of the population, but for the limits that
@@ -22,9 +22,9 @@ from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import Reach, Route, View
 
-STEPS = 200  # of time in a delay
+STEPS = 200  # number of time steps in a delay
 SMITH_STEPS = 500  # the same under a Smith predictor
-DELAYS = 80  # a run lasts so many of them
+DELAYS = 80  # duration of a run, in delays
 BISECTIONS = 14
 _NO_LIMIT = 1e6  # a limit that is never reached
 LIMITLESS = Reach(speed=_NO_LIMIT, turn_rate=_NO_LIMIT)
@@ -118,7 +118,7 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
 
     Args:
         gain: Gain of the person [1/s].
-        delay: Between a command and its effect [s]; a step is a part of it, see `SMITH_STEPS`.
+        delay: Delay from a command to its effect [s], divided into `SMITH_STEPS`.
         end: [s]
     """
     dt = delay / SMITH_STEPS

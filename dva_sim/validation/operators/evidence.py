@@ -22,7 +22,7 @@ from dva_sim.validation.evidence import RULE, Evidence, share_rule
 from dva_sim.validation.evidence_page import ResultSheet, ValidationResult
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.people_figures import draw_curves
-from dva_sim.validation.operators.trials import Cells, Found, certain, mean
+from dva_sim.validation.operators.trials import Cells, LineValue, certain, mean
 
 STANDARDS = "standards"  # the exact lines that have nothing to do with operators and phones
 GROUPS: dict[tuple[LineKind, bool], str] = {
@@ -55,7 +55,7 @@ BY = {
 
 def evidence(
     lines: Sequence[TargetLine],
-    simulated: Mapping[str, Found],
+    simulated: Mapping[str, LineValue],
     split: SplitFile,
     *,
     played: Mapping[str, Cells],
@@ -67,7 +67,7 @@ def evidence(
         lines: Published numbers.
         simulated: Simulated numbers by the line's id.
         split: Roles of the publications, and earlier comparisons.
-        played: The trials of each experiment.
+        played: Trials of each experiment.
         conditions: Conditions of the runs, by name.
     """
     verdicts = judge(lines, simulated)
@@ -91,12 +91,12 @@ def evidence(
     )
 
 
-def judge(lines: Sequence[TargetLine], simulated: Mapping[str, Found]) -> list[Evidence]:
-    """Return a verdict for each line; what was not simulated is nan, and misses."""
+def judge(lines: Sequence[TargetLine], simulated: Mapping[str, LineValue]) -> list[Evidence]:
+    """Return a verdict for each line; lines that were not simulated are nan and miss."""
     return [_judged(line, simulated.get(line.id, certain(math.nan))) for line in lines]
 
 
-def _judged(line: TargetLine, simulated: Found) -> Evidence:
+def _judged(line: TargetLine, simulated: LineValue) -> Evidence:
     inside = line.holds(simulated.value) and line.is_sure(simulated.low, simulated.high)
     is_counted = line.kind in COUNTED
     notes = []
@@ -133,7 +133,7 @@ def rule_of(
     rule: RuleConfig,
     blind: Mapping[str, tuple[int, int]],
 ) -> list[Evidence]:
-    """Return the shares that must hold, and those that are shown beside them.
+    """Return the shares of lines that must hold, and those that are only shown.
 
     These are publications that hold in all their lines, and lines that held when nobody had seen
     them yet (`blind`: as `blind_lines` returns them).

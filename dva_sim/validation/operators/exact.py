@@ -40,8 +40,8 @@ Floats = NDArray[np.float64]
 
 PERSONS = 20_000
 HELP = "outside-help"
-HELP_S = 2.4e7  # simulated of it: some 6600 calls of each kind
-LATEST = 8 * 3600.0  # no alarm within a shift is none [s]
+HELP_S = 2.4e7  # simulated time of the helpers [s]: about 6600 calls of each kind
+LATEST = 8 * 3600.0  # time after which an alarm counts as missing: a shift [s]
 PPM = (30, 50, 100, 300)
 
 

@@ -1,8 +1,8 @@
 """Published experiments: which task is played under which conditions, and how it is aggregated.
 
 Each aggregates as the publication did: means over all persons, lines through the means of
-conditions. How, was settled before anything was compared. At the end of the module they are
-played, with the exact checks, spread over processes.
+conditions. The aggregation was fixed before any comparison. At the end of the module the
+experiments and the exact checks are played in several processes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from dva_sim.validation.operators.looking import PARTS
 from dva_sim.validation.operators.trials import (
     Cells,
     Floats,
-    Found,
+    LineValue,
     Trials,
     Values,
     certain,
@@ -53,16 +53,16 @@ AT_BITS = 4.0
 GAINS = {25: 0.2435, 50: 0.487, 100: 0.974, 200: 1.948}  # pixels/s per degree: [m/s per rad]
 PUBLISHED_GAIN = 50
 SELECTIONS = {"first-entry": "first_entry", "dwell": "dwell"}
-LATENCY_S = 0.05  # of the machine in the steering experiment; assumed
+LATENCY_S = 0.05  # latency of the machine in the steering experiment [s]; assumed
 STEP_S = 1.0 / 60.0
-MIN_WAITS = 0.5  # in a trial on average; who waits less does not move and wait
+MIN_WAITS = 0.5  # mean waits per trial from which a person counts as moving and waiting
 WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
 EXCAVATOR_S = 1.5
 FRAME_RATES = (5, 10, 20, 60)
 FRAME_DELAYS_S = (0.0, 0.1, 0.2, 0.3)
 _NOTHING = 1e-9  # times that differ by less are the same [s]
 _C = np.linspace(0.0, 6.0, 121)  # tried for the collapse
-TRIED = {"S15/c": (float(_C[0]), float(_C[-1]))}  # from where to where a value was looked for
+TRIED = {"S15/c": (float(_C[0]), float(_C[-1]))}  # range in which a value was searched
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Experiment:
         name: Name of the experiment.
         scenario: The task, by name; None: a part of the operator, see `looking`.
         cells: Changes in each cell that the task itself does not cross.
-        measure: From the trials to the value of each line.
+        measure: Function from the trials to the value of each line.
         quick: Further changes for a quick look.
     """
 
@@ -86,7 +86,7 @@ class Experiment:
 
 # --- pointing under lag: MacKenzie & Ware 1993 -----------------------------------------------
 def lag_values(cells: Cells) -> Values:
-    """Ratios of mean movement times, what a millisecond of lag costs at 4 bits, the times [ms]."""
+    """Return ratios of movement times, cost of a millisecond of lag at 4 bits, and times [ms]."""
     times = {lag: mean(trials, "movement_time_s") for lag, trials in cells.items()}
     ratio = {lag: time / times[MIN_LAG] for lag, time in times.items()}
     values = {"S7/25": ratio["25"], "S7/75": ratio["75"], "S8/slope": lag_slope(cells)}
@@ -123,7 +123,7 @@ def tilt_values(cells: Cells) -> Values:
 
 
 def throughput(trials: Trials) -> float:
-    """Return bits per second: of each person and condition, then the mean of all.
+    """Return the throughput [bit/s]: the mean over all persons and conditions.
 
     Selections cannot miss here, so the index is the nominal one.
     """
@@ -159,11 +159,11 @@ def latency_values(cells: Cells) -> Values:
     return {f"S12/{name}": times[name] / times["as it is"] for name in ("less", "more")}
 
 
-# --- waiting for what one has done: Ferrell 1965, an excavator -------------------------------
+# --- waiting for feedback: Ferrell 1965, an excavator ----------------------------------------
 def wait_values(cells: Cells) -> Values:
     """Return the linearity of completion time in the delay, and the slope without the waits.
 
-    The slope of who does not wait says nothing of move-and-wait.
+    The slope of persons who do not wait says nothing about move-and-wait.
     """
     delays = [float(name) for name in cells]
     times = [mean(trials, "movement_time_s") for trials in cells.values()]
@@ -182,7 +182,7 @@ def excavator_values(cells: Cells) -> Values:
 
 # --- shown only: tracking and frame rate -----------------------------------------------------
 def tracking_values(cells: Cells) -> Values:
-    """Return means over persons of what is read off their open loops."""
+    """Return means over persons of the parameters of their open loops."""
     trials = cells["tracking"]
     crossover = mean(trials, "crossover_rad_s")
     margin = mean(trials, "phase_margin_deg")
@@ -219,7 +219,7 @@ def _parabola(x: Floats, y: Floats) -> float:
 
 
 # --- moving targets under late clicks: Claypool, Eg & Raaen 2017 -------------------------------
-ADDED_S = (0.0, 0.1, 0.2, 0.3, 0.4)  # on top of the local lag
+ADDED_S = (0.0, 0.1, 0.2, 0.3, 0.4)  # delays on top of the local lag [s]
 LOCAL_S = 0.1
 SPEEDS_MPS = (0.0375, 0.075, 0.1125)
 
@@ -230,7 +230,7 @@ def moving_cell(added: float, speed: float) -> str:
 
 
 def log_times(trials: Trials) -> Floats:
-    """Return the logarithm of the time of each trial `(n,)`."""
+    """Return the logarithm of the duration of each trial `(n,)`."""
     return np.log(trials["movement_time_s"])
 
 
@@ -343,7 +343,7 @@ TILT_KINDS: dict[str, dict[str, Any]] = {
 
 
 def tilt_kind_values(cells: Cells) -> Values:
-    """Return the throughput of a tilt that is a place over that of one that is a velocity."""
+    """Return the throughput of position control by tilt over that of velocity control."""
     rate = {
         kind: np.mean([throughput(cells[f"{kind}/{name}"]) for name in SELECTIONS])
         for kind in TILT_KINDS
@@ -384,7 +384,7 @@ def pushed_values(cells: Cells) -> Values:
 
 
 # --- the first steering: Goodridge et al. 2022 -------------------------------------------------
-MIN_REACTION_S = 1e-3  # an operator without a reaction time has one of so much, for its logarithm
+MIN_REACTION_S = 1e-3  # lower limit of reaction times, for the logarithm
 
 
 def log_reactions(trials: Trials) -> Floats:
@@ -418,7 +418,7 @@ def heading_values(cells: Cells) -> Values:
 
 # --- looking: Wagenmakers et al. 2008, Colley et al. 2025, searchers, walkers ------------------
 def choice_values(cells: Cells) -> Values:
-    """Return the accuracy against speed: times of each person, errors of all."""
+    """Return the trade-off of accuracy and speed: times per person, and errors of all."""
     times = {c: person_medians(trials, "time_s") for c, trials in cells.items()}
     errors = {c: mean(trials, "error") for c, trials in cells.items()}
     share = errors["accuracy"] / errors["speed"] if errors["speed"] else math.nan
@@ -432,7 +432,7 @@ def vehicle_values(cells: Cells) -> Values:
 
 
 def look_values(cells: Cells) -> Values:
-    """Return quartiles of the looks of all, and the spread of their logarithm."""
+    """Return the quartiles of the durations of all looks, and the spread of their logarithm."""
     looks = cells["two"]["look_s"]
     looks = looks[looks > MIN_LOOK_S]
     first, median, third = np.quantile(looks, [0.25, 0.5, 0.75])
@@ -440,7 +440,7 @@ def look_values(cells: Cells) -> Values:
     return {"E2/median": median, "E2/first": first, "E2/third": third, "E3/spread": spread}
 
 
-MIN_LOOK_S = 0.3  # what is shorter was not counted
+MIN_LOOK_S = 0.3  # shorter looks were not counted [s]
 
 
 def alarm_values(cells: Cells) -> Values:
@@ -491,7 +491,7 @@ def _moving_cells() -> dict[str, dict[str, Any]]:
 
 
 _QUICK = {"trials": 4, "practice": 1}
-_ONE = {"trials": 1, "practice": 1}  # of each of many conditions
+_ONE = {"trials": 1, "practice": 1}  # one trial in each of many conditions
 _TWO = {"trials": 2, "practice": 1}
 _FEW = {"trials": 3, "practice": 1}
 
@@ -566,7 +566,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("items", None, {"open": {}}, item_values),
     Experiment("walkers", None, {"street": {}}, walker_values),
 )
-"""Every experiment; which of them may be fitted to, the split file says."""
+"""All experiments; the split file tells which of them may be fitted to."""
 
 
 PERSONS = 24
@@ -582,11 +582,11 @@ class OperatorsSetting:
 
     Attributes:
         strategy: Strategy of the persons.
-        seed: Random seed of everything, the persons included.
+        seed: Random seed of all runs and persons.
         persons: Number of persons.
-        quick: Few trials.
-        workers: Processes.
-        traits: Medians that take the place of the population's, for a fit.
+        quick: True for few trials.
+        workers: Number of processes.
+        traits: Medians that replace those of the population, for a fit.
     """
 
     strategy: str
@@ -599,8 +599,8 @@ class OperatorsSetting:
 
 def play_exact(
     checks: Sequence[str], setting: OperatorsSetting, progress: Progress = lambda done: None
-) -> dict[str, Found]:
-    """Return the value of each line of some exact checks, by its id.
+) -> dict[str, LineValue]:
+    """Return the value of each line of the given exact checks, by id.
 
     Raises:
         RunsFailed: one of them could not be simulated.
@@ -636,16 +636,16 @@ def play_experiments(
 
 def measured(
     experiments: Sequence[Experiment], played: Mapping[str, Cells], seed: int
-) -> dict[str, Found]:
+) -> dict[str, LineValue]:
     """Return the value of each line with its interval, by its id."""
-    estimates: dict[str, Found] = {}
+    estimates: dict[str, LineValue] = {}
     for experiment in experiments:
         rng = Streams(seed).fresh(f"resampling/{experiment.name}")
         estimates |= with_intervals(experiment.measure, played[experiment.name], rng)
     return estimates
 
 
-def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
+def count_jobs(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
     """Return the number of jobs in the experiments."""
     return sum(len(e.cells) for e in experiments) * setting.persons
 

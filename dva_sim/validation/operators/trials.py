@@ -66,7 +66,7 @@ Measure = Callable[[Cells], Values]
 
 
 @dataclass(frozen=True)
-class Found:
+class LineValue:
     """A simulated number.
 
     Attributes:
@@ -82,9 +82,9 @@ class Found:
     persons: int = 0
 
 
-def certain(value: float) -> Found:
+def certain(value: float) -> LineValue:
     """Return a number that rests on no persons."""
-    return Found(value, value, value)
+    return LineValue(value, value, value)
 
 
 def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
@@ -100,7 +100,9 @@ def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
     return Trials(person, columns)
 
 
-def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> dict[str, Found]:
+def with_intervals(
+    measure: Measure, cells: Cells, rng: np.random.Generator
+) -> dict[str, LineValue]:
     """Return values of a measure with bootstrap intervals over persons.
 
     Args:
@@ -117,7 +119,7 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
         for name, drawn in draws.items():
             drawn.append(again[name])
     return {
-        name: Found(float(value), *_middle(draws[name]), len(persons))
+        name: LineValue(float(value), *_middle(draws[name]), len(persons))
         for name, value in values.items()
     }
 

@@ -13,7 +13,7 @@ from dva_sim.validation.evidence import headline, passes
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators.evidence import GROUPS, judge, rule_of, steered
 from dva_sim.validation.operators.trials import (
-    Found,
+    LineValue,
     Trials,
     certain,
     collect,
@@ -64,7 +64,7 @@ def test_a_target_changed_to_a_wrong_number_makes_the_verdict_a_miss():
 def test_where_the_sign_counts_no_effect_misses_and_so_does_an_interval_that_holds_none(line, sign):
     for value, other_end, word in ((0.0, 0.0, "misses"), (2, -1, "misses"), (2, 1, "holds")):
         ends = sorted(1 + 0.01 * sign * share for share in (other_end, 3))
-        found = Found(1 + 0.01 * sign * value, *ends, 24)
+        found = LineValue(1 + 0.01 * sign * value, *ends, 24)
         assert judge([LINES[line]], {line: found})[0].verdict == word
 
 

@@ -1,4 +1,4 @@
-"""The transports of commands in virtual time, as far as the model can say what they do.
+"""The transports of commands in virtual time, as far as the model covers them.
 
 ZeroMQ, WebSocket, MQTT and Zenoh over TCP ride on TCP segment by segment, a datagram on the link
 alone. Sizes are those of the specifications; what a library does of its own beyond that (batches,
@@ -75,7 +75,7 @@ class Carrier(OperatorEnd):
 
     @abstractmethod
     def open(self, ready: Act) -> None:
-        """Connect; `ready()` when the operator's program goes on."""
+        """Connect; `ready()` is called when the operator's program may continue."""
 
     @abstractmethod
     def picture(self, number: int) -> None:
@@ -133,24 +133,24 @@ class DatagramCarrier(Carrier):
 
 
 HELLO: Final = "hello"
-Exchanges = Sequence[tuple[int, int]]  # what is said, and answered, before messages [B]
+Exchanges = Sequence[tuple[int, int]]  # sizes of handshake requests and replies [B]
 
 
 class ClientConnection:
-    """A TCP connection that a client opens, both ends of it, and what is said before messages.
+    """Both ends of a TCP connection that a client opens, with the handshake before messages.
 
     Args:
         clock: Virtual time.
         links: From the client, and back.
         tcp: TCP options of both ends.
-        exchanges: Sizes of what is said, and answered, before messages.
+        exchanges: Sizes of the handshake's requests and replies [B].
 
     Attributes:
         up: Messages of the client.
         down: Messages of the server.
         at_server: Callback for each message of the client.
         at_client: Callback for each message of the server.
-        is_ready: True once all has been said.
+        is_ready: True once the handshake is complete.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class ClientConnection:
         self.is_ready = False
 
     def open(self, ready: Act) -> None:
-        """Connect; `ready()` when all has been said."""
+        """Connect; `ready()` is called once the handshake is complete."""
 
         def opened() -> None:
             self.up.open()
@@ -260,7 +260,7 @@ class MqttLeg:
     """One direction between a client and the broker; with QoS 1 the other end acknowledges.
 
     Args:
-        out: Carries what is published.
+        out: Connection for published messages.
         qos: 0 or 1.
     """
 
@@ -286,7 +286,7 @@ class MqttLeg:
 
 
 class MqttClient(ClientConnection):
-    """A client's connection to the broker, both ends of it.
+    """Both ends of a client's connection to the broker.
 
     Args:
         clock: Virtual time.
@@ -315,7 +315,7 @@ class MqttClient(ClientConnection):
     def _heard(
         self, back: MqttLeg, stream: OrderedMessages, take: Callable[[int], object], what: Any
     ) -> None:
-        """Take a message and acknowledge it, or an acknowledgement of what went back."""
+        """Handle a message, which is acknowledged, or an acknowledgement."""
         if what == ACKNOWLEDGEMENT:
             back.acknowledged()
             return
@@ -426,7 +426,7 @@ class PublishCarrier(ZeroMqCarrier):
     def send(self, number: int) -> bool:
         if self._is_joined:
             self._commands.opener.send(number, framed(len(TELE_OP.command(number))))
-        return True  # PUB drops what nobody takes
+        return True  # PUB drops messages without subscribers
 
 
 class RequestCarrier(ZeroMqCarrier):
@@ -501,8 +501,8 @@ def why_not(transport: CommandTransport) -> str:
     return f"{transport.title or type(transport).__name__} is not modelled"
 
 
-def carrier_of(transport: CommandTransport, between: BetweenPrograms) -> Carrier:
-    """Return the carrier that plays a transport of which `why_not` says nothing."""
+def make_carrier(transport: CommandTransport, between: BetweenPrograms) -> Carrier:
+    """Return the carrier of a transport for which `why_not` has no objection."""
     if isinstance(transport, ZeroMqTransport):
         kind = RequestCarrier if transport.pattern == "req-rep" else PublishCarrier
         return kind(between, transport)

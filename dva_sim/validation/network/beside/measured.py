@@ -1,4 +1,4 @@
-"""A study's measured rows beside the predictions: inside the band, outside, or why neither."""
+"""Verdicts on a study's measured rows: inside the predicted band, outside, or not judged."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from dva_sim.validation.network.beside.predictions import (
     rows_of,
 )
 
-STUDY: Final = "middleware"  # measured the commands that are kept
-MIN_RUNS: Final = 3  # undisturbed ones, of which a median is judged
+STUDY: Final = "middleware"  # study that measured the kept commands
+MIN_RUNS: Final = 3  # minimum undisturbed runs for judging a median
 MIN_INSIDE: Final = 0.90  # share of the rows that are judged
 MEANINGS: Final = {column.name: column.meaning for column in RUN_COLUMNS}
 NOT_JUDGED: Final = "not judged"
@@ -42,7 +42,7 @@ def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
     """Return the middleware configurations of a study, with the seeds of their runs.
 
     Args:
-        results: Those of the study, whose scenarios may have been others.
+        results: Results of the study, perhaps with other scenarios.
 
     Raises:
         ConfigError: there is none, or a file that the study names cannot be read.
@@ -101,7 +101,7 @@ def measured_in(results: Results) -> dict[str, Measured]:
 def measured_in_commands(path: Path, asked_cells: Sequence[AskedCell]) -> dict[str, Measured]:
     """Return the kept commands of a study, by configuration.
 
-    It is not kept which runs were disturbed.
+    The table does not tell which runs were disturbed.
 
     Args:
         path: A table of commands, by middleware, link and person: when each was made and when it
@@ -148,7 +148,7 @@ def _measures(
 def lines_beside(
     predictions: Sequence[CellPrediction], measured: Mapping[str, Measured] | None
 ) -> list[Evidence]:
-    """Return every measure of every configuration, with what was measured, if anything was."""
+    """Return every measure of every configuration, with the measured value if there is one."""
     lines = []
     for measure in ALLOWANCES:
         for prediction in predictions:
@@ -188,7 +188,7 @@ def _line(prediction: CellPrediction, measure: str, own: Measured | None) -> Evi
 def rule_of(lines: Sequence[Evidence]) -> Evidence:
     """Return the share of rows inside their bands.
 
-    It misses if what was measured cannot be judged.
+    It misses if the measured values cannot be judged.
     """
     verdicts = [line.verdict for line in judged(lines)]
     if verdicts:
@@ -213,11 +213,11 @@ def beside_of(
     workers: int,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> ValidationResult:
-    """Predict some configurations, as far as no bands were kept, beside what was measured.
+    """Return predictions with measured values, computing only bands that were not kept.
 
     Args:
         asked_cells: The configurations.
-        measured: The runs of each; None if there are none, and all are predicted now.
+        measured: Runs of each configuration; None: all are predicted now, without measured values.
         plays: Number of simulated runs per seed.
         workers: Processes.
         progress: Callback with the number of finished runs, and of all runs.

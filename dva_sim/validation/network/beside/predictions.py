@@ -37,8 +37,8 @@ from dva_sim.validation.network.beside.carriers import why_not
 from dva_sim.validation.network.beside.virtual_run import ProgramTimes, VirtualRun
 from dva_sim.validation.network.reference import FOLDER
 
-PLAYS = 20  # for each seed
-QUICK_PLAYS = 5  # for each seed
+PLAYS = 20  # number of plays for each seed
+QUICK_PLAYS = 5  # number of plays for each seed in a quick validation
 DRAWS: Final = 4000
 INTERVAL: Final = (2.5, 97.5)
 KEPT: Final = "middleware-predictions"
@@ -69,7 +69,7 @@ ALLOWANCES: Final[Mapping[str, Allowance]] = {
 
 
 class PredictedBand(NamedTuple):
-    """A prediction, and from where to where what is measured may lie."""
+    """A prediction, and the band in which the measured value should lie."""
 
     low: float
     predicted: float
@@ -88,7 +88,7 @@ class CellPrediction:
         config: Its hash.
         levels: Its level of each factor.
         seeds: Random seeds of the study's runs.
-        bands: By measure; none where the model says nothing.
+        bands: Bands by measure; none without a prediction.
         why: Reason for not predicting it.
     """
 
@@ -191,7 +191,7 @@ def _bands(cell: AskedCell, by_seed: Sequence[Sequence[Row]]) -> dict[str, Predi
 def widened(
     band: PredictedBand, allowance: Allowance, scenario: MiddlewareScenario
 ) -> PredictedBand:
-    """Return a band with room for what the model leaves out; nothing measured is below 0."""
+    """Return a band with a margin for effects outside of the model; its low end is at least 0."""
     low, predicted, high = band
     amount = allowance.amount(scenario)
     return PredictedBand(
@@ -221,7 +221,7 @@ def rows_of(predictions: Sequence[CellPrediction]) -> list[Row]:
 
 
 def read_kept(name: str = KEPT) -> dict[tuple[str, tuple[int, ...]], dict[str, PredictedBand]]:
-    """Return the bands of a table that was kept, by configuration and seeds.
+    """Return the bands of a kept table, by configuration and seeds.
 
     Raises:
         ConfigError: it cannot be read, or something is missing in it.

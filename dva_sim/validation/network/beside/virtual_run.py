@@ -22,7 +22,7 @@ from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.measures.middleware import command_row
 from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.middleware.run import LINGER_S, Window
-from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, carrier_of
+from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, make_carrier
 
 PROGRAM_S = 0.0005
 """From the arrival of a command's last packet to its application: assumed. It also decides what
@@ -61,7 +61,7 @@ class CountedLink(PartedLink):
         return arrival
 
     def passed_bytes(self, by: float) -> int:
-        """Return bytes that have come out by a time [s]."""
+        """Return the number of bytes that have left the link by a time [s]."""
         return sum(size for arrival, size in self._passed if arrival <= by)
 
 
@@ -93,7 +93,7 @@ class VirtualRun:
             lambda number: None,
         )
         transport = load_transport(scenario.transport.name, scenario.transport.options)()
-        self._carrier = carrier_of(transport, between)
+        self._carrier = make_carrier(transport, between)
         self._operator = OperatorWorkload(
             self._clock, self._carrier, self._note, scenario.command_rate_hz
         )

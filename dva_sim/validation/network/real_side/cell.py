@@ -1,4 +1,4 @@
-"""One run: a process that starts both ends, is the link between them, and tells what they noted.
+"""One run: a process that starts both ends, emulates the link, and reports their notes.
 
 It happens in a fresh interpreter with one thread, told what to do by one line of JSON (see
 `start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
@@ -49,7 +49,7 @@ from dva_sim.validation.network.real_side.programs import (
 )
 
 PROGRAM_PRIORITY = 10  # real-time, below the forwarder's
-_PATIENCE_S = 20.0  # for a node to be ready
+_PATIENCE_S = 20.0  # maximum time until a node is ready [s]
 
 Program = Callable[[socket.socket, FileNotes], None]
 """Function that runs in a node, with a connection to its starter and a place for its notes."""
@@ -74,10 +74,10 @@ class Node:
     file: int
 
     def hear(self) -> tuple[bytes, list[int]]:
-        """Wait for the next word of the node: what it says, and file descriptors it hands over.
+        """Wait for the next message of the node; return it and the file descriptors with it.
 
         Raises:
-            ChildProcessError: it ended or said nothing.
+            ChildProcessError: the node ended or sent nothing.
         """
         with contextlib.suppress(OSError):
             data, handed, *_ = socket.recv_fds(self.channel, 256, 1)
@@ -119,7 +119,7 @@ def start_node(name: str, program: Program) -> Node:
 
 
 def _live(parent: int, program: Program, channel: socket.socket, notes: FileNotes) -> None:
-    """Do all that a node's process does; never return."""
+    """Run a node's process; never return."""
     code = 1
     try:
         linux_calls.die_with_parent(parent)
@@ -150,7 +150,7 @@ class EmulatedJob:
             to see whether it can be set up.
         wire: The link.
         seed: Random seed of the link.
-        bound_s: The run ends after so much time, whatever happens [s].
+        bound_s: Maximum duration of the run [s].
         arguments: Arguments of the program.
         congestion: Congestion control of all TCP.
         link: `packets` or `proxy`.
@@ -264,7 +264,7 @@ class EmulatedCell:
         return self._nodes[-1]
 
     def _run(self, link: EmulatedLink[Any]) -> str:
-        """Let both ends run until the operator's program is over; what went wrong, if it did."""
+        """Run both ends until the operator's program ends; return an error, or ""."""
         operator, robot = self._nodes
         watched = [operator.ended, robot.ended, _STDIN]
         end = link.run(watched, time.monotonic() + self._job.bound_s)
@@ -318,11 +318,11 @@ def _programs(job: EmulatedJob) -> tuple[Program, Program]:
     return begin_nothing, await_nothing
 
 
-_SLACK_S = 30.0  # for starting and ending the processes
+_SLACK_S = 30.0  # time for starting and ending the processes [s]
 
 
 def run_job(job: EmulatedJob) -> EmulatedOutcome:
-    """Run a job in a process of its own; whatever happens here, nothing of it is left.
+    """Run a job in a process of its own, which is ended with all its children in any case.
 
     Raises:
         EmulatorError: it failed; the line says why.
@@ -360,7 +360,7 @@ def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Po
         stdin=subprocess.PIPE,
         stdout=out,
         stderr=err,
-        start_new_session=True,  # Ctrl-C is for whoever waits, who then ends this
+        start_new_session=True,  # Ctrl-C must reach only the parent, which then ends this
     )
     assert process.stdin is not None
     process.stdin.write(f"{job.to_json()}\n".encode())
@@ -369,7 +369,7 @@ def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Po
 
 
 def why_no_packets() -> str:
-    """Return one line that says why packets cannot be emulated here; empty where they can."""
+    """Return a line with the reason why packets cannot be emulated here; empty if they can."""
     if sys.platform != "linux":
         return f"the emulated link {NEEDS}; this is {sys.platform}"
     try:
@@ -380,7 +380,7 @@ def why_no_packets() -> str:
 
 
 def refuse_for_proxy(job: EmulatedJob) -> None:
-    """Raise where a relay cannot do what is asked.
+    """Reject a job that a relay cannot emulate.
 
     Raises:
         EmulatorError: it would have to lose or reorder packets.

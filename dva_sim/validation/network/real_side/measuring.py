@@ -130,7 +130,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 
 
 def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
-    """Return the job for the process of one run."""
+    """Make the job for the process of one run."""
     played_s = condition.warm_s + condition.dur_s
     return EmulatedJob(
         "commands",
@@ -151,7 +151,7 @@ class Table(AbstractContextManager["Table"]):
 
     Args:
         path: The file; made if it is not there.
-        columns: Its columns.
+        columns: Columns of the table.
 
     Raises:
         ConfigError: it cannot be written, has other columns, or another campaign writes to it.
@@ -220,7 +220,7 @@ class Table(AbstractContextManager["Table"]):
 
 _IDENTITY = ("cell", "group", "seed", "cond_id")
 _OVERHEAD_S = 1.5  # processes, handshake and waiting, about
-_MAX_FAILURES = 3  # in a row
+_MAX_FAILURES = 3  # maximum consecutive failures
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ class Progress:
 
     Attributes:
         done: Rows that are there.
-        total: Rows that are wanted.
+        total: Number of rows to measure.
         left_s: About the time it still takes [s].
     """
 
@@ -258,7 +258,7 @@ def measure_all(
         link: `packets` or `proxy`.
 
     Returns:
-        What could not be measured, a line each.
+        A line for each run that could not be measured.
 
     Raises:
         ConfigError: the file cannot be written, or holds something else.
@@ -294,7 +294,7 @@ def _time_of(left: Sequence[tuple[Condition, int]]) -> float:
     return sum(c.warm_s + c.dur_s + 8e-3 * c.delay_ms + _OVERHEAD_S for c, _ in left)
 
 
-QUICK_S = 12.0  # measured of each condition; enough for twenty commands in nearly all
+QUICK_S = 12.0  # measured time of each condition, mostly enough for 20 commands [s]
 
 
 Tell = Callable[[str, Progress], None]
@@ -302,7 +302,7 @@ Tell = Callable[[str, Progress], None]
 
 
 def measure_design(blocks: Sequence[BlockConfig], path: Path, tell: Tell) -> list[str]:
-    """Measure what a design wants and a table does not hold yet; what failed, a line each.
+    """Measure the runs of a design that are missing in a table; return a line per failure.
 
     Raises:
         ConfigError: the table cannot be written, or holds something else.
@@ -325,7 +325,7 @@ def measure_design(blocks: Sequence[BlockConfig], path: Path, tell: Tell) -> lis
 def measure_now(
     blocks: Sequence[BlockConfig], path: Path, quick: bool, link: str, tell: Tell
 ) -> tuple[list[SocketRun], list[str]]:
-    """Measure each condition of a design once; the runs, and what failed, a line each.
+    """Measure each condition of a design once; return the runs, and a line per failure.
 
     Args:
         blocks: The design.

@@ -41,7 +41,7 @@ def run_robot(
     Args:
         endpoint: Address to bind.
         channel: Gets the endpoint when it is bound.
-        notes: Gets the end of each command's processing.
+        notes: Receives the end of each command's processing.
     """
     workload = RobotWorkload(FORM, notes.add)
     with zmq.Context() as context:
@@ -57,15 +57,15 @@ def run_robot(
 
 
 def run_operator(condition: Condition, channel: socket.socket, notes: FileNotes) -> None:
-    """Wait to hear where the robot is, then send commands until the window ends.
+    """Wait for the robot's address, then send commands until the window ends.
 
     Args:
         channel: Channel on which the robot's endpoint arrives.
-        notes: Gets what happens.
+        notes: Receives all events.
 
     Raises:
         TimeoutError: the handshake took more than a minute.
-        OSError: the kernel used another congestion control than it was told to.
+        OSError: the kernel used another congestion control than requested.
     """
     endpoint = channel.recv(256).decode()
     with zmq.Context() as context:
@@ -97,7 +97,7 @@ class OperatorSockets:
     Args:
         context: Context of its sockets.
         endpoint: Endpoint of the robot.
-        notes: Gets the opening of the first socket, and how its connection came about.
+        notes: Receives the opening of the first socket, and the steps of its connection.
 
     Attributes:
         on_open: Callback when the first connection stands.
@@ -122,7 +122,7 @@ class OperatorSockets:
         return PlainWire(self.clock, self._connected(), on_reply)
 
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """Publish a command; PUB drops what nobody takes."""
+        """Publish a command; PUB drops it without subscribers."""
         self._publisher.send(payload)
 
     def _connected(self) -> Socket:
@@ -162,7 +162,7 @@ class OperatorSockets:
 
 
 def _open(context: Context, condition: Condition, operator: bool) -> Socket:
-    """Return a socket of one end, set as the condition says."""
+    """Return a socket of one end, with the options of the condition."""
     kind = _ENDS[condition.pattern][0 if operator else 1]
     conflates = condition.conflate in ("both", "op" if operator else "rob")
     opened = plain_socket(context, kind, condition.hwm, conflates)
@@ -179,7 +179,7 @@ def _pause_until(due: float) -> None:
         time.sleep(left)
 
 
-HEADERS_BYTES = 28  # of IPv4 and UDP
+HEADERS_BYTES = 28  # size of the IPv4 and UDP headers
 _PORT = 5556
 
 
@@ -195,12 +195,12 @@ def run_sender(
     """Send datagrams in equal steps, then wait for the last ones to arrive.
 
     Args:
-        channel: Says when the other end listens.
-        notes: Gets the time of each sending.
+        channel: Channel that tells when the other end listens.
+        notes: Receives the time of each sending.
         address: Address of the other end.
         count: Datagrams.
         size: Packet size including headers [B].
-        interval_s: Between two of them [s].
+        interval_s: Interval between two packets [s].
         linger_s: Time to wait at the end [s].
     """
     channel.recv(256)
@@ -220,7 +220,7 @@ def run_counter(channel: socket.socket, notes: FileNotes, address: str) -> None:
 
     Args:
         channel: Channel for the message that this end listens.
-        notes: Gets the time of each arrival.
+        notes: Receives the time of each arrival.
         address: Address of this end.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
@@ -236,6 +236,6 @@ def begin_nothing(channel: socket.socket, notes: FileNotes) -> None:
 
 
 def await_nothing(channel: socket.socket, notes: FileNotes) -> None:
-    """Say that this end is there, and wait to be killed."""
-    channel.send(b"tcp://127.0.0.1:9")  # a relay wants an address; nobody connects
+    """Report that this end is ready, and wait to be killed."""
+    channel.send(b"tcp://127.0.0.1:9")  # a relay needs an address, although nothing connects
     signal.pause()

@@ -56,12 +56,12 @@ class LinkFinding:
 
 @dataclass(frozen=True)
 class Probe:
-    """Datagrams in equal steps over a link, and what is found out by them.
+    """Datagrams at equal intervals over a link, and the measured properties.
 
     Attributes:
         wire: Settings of the link.
         count: Datagrams.
-        interval_s: Between two of them [s].
+        interval_s: Interval between two datagrams [s].
         size: Packet size including headers [B].
         find: Findings from the wire, the times of sending and arrival [s] and their numbers.
     """
@@ -175,7 +175,7 @@ def find_loss(crossing: Crossing) -> list[LinkFinding]:
 
 
 def find_bursts(crossing: Crossing) -> list[LinkFinding]:
-    """Return the mean length of runs of losses, whose law is geometric."""
+    """Return the mean length of runs of losses, which is distributed geometrically."""
     runs = [sum(1 for _ in run) for lost, run in groupby(crossing.lost) if lost]
     bursts = crossing.wire.bursts
     mean = (bursts and bursts.mean_packets) or 1.0
