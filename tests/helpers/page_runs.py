@@ -48,7 +48,7 @@ class Block(NamedTuple):
     Attributes:
         language: Language of the fence.
         text: Text between the fences.
-        file: Name of the file that the block is; empty if it is none.
+        file: Name of the file that the block contains; empty for other blocks.
         order: Words of the comment in front of it.
     """
 
@@ -108,7 +108,7 @@ def parse(words: list[str]) -> None:
 
 
 def run(page: Path, folder: Path) -> str:
-    """Do in a folder what a page says, and return all that was printed.
+    """Follow a page in a folder, and return all output.
 
     Raises:
         AssertionError: a block prints something else than the page shows, or fails.
@@ -131,7 +131,7 @@ class _Runner:
         self._port = _free_ports(4)
 
     def take(self, block: Block, place: str) -> None:
-        """Do what a block says."""
+        """Run a block."""
         if block.file:
             path = self.folder / block.file
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -151,7 +151,7 @@ class _Runner:
             assert missing == [], f"{place}: {missing}\nnot in:\n{self.printed.text}"
 
     def end(self) -> None:
-        """End what still runs."""
+        """End the running programs."""
         for group in self._groups:
             try:
                 os.killpg(group, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""A phone in a hand: a small screen with touch, a sensor that reads what the test says, taps."""
+"""A simulated phone: a small touch screen, and a sensor with readings from the test."""
 
 from collections.abc import Callable
 from typing import Any
@@ -75,7 +75,7 @@ class Hand:
         return self.page.get_by_role("status", name=name, exact=True)
 
     def alert(self, text: str) -> None:
-        """An alert says so."""
+        """Expect an alert with this text."""
         found = self.page.get_by_role("alert").filter(has_text=text)
         expect(found.first).to_be_visible()
 
@@ -129,12 +129,12 @@ class Hand:
         self.is_driving()
 
     def is_driving(self, driving: bool = True) -> None:
-        """Wait until it drives, or drives no more."""
+        """Wait until the phone drives, or until it does not."""
         name = "Stop" if driving else "Start"
         expect(self.page.get_by_role("button", name=name, exact=True)).to_be_enabled()
 
     def speed(self, mps: str) -> None:
-        """It tells so much."""
+        """Expect this reading on the page."""
         expect(self.status("Speed")).to_have_text(f"Speed: {mps}m/s")
 
     def leave(self) -> None:

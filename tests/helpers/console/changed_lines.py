@@ -17,7 +17,7 @@ def sockets_of(
     """Return the sockets of a name that pages open from now on.
 
     Args:
-        change: Returns what a page hears instead of a line; None: nothing.
+        change: Function that returns the line for the page in place of one; None: no line.
         asked: Callback for each line of a page.
     """
     sockets: list[WebSocketRoute] = []
@@ -43,5 +43,5 @@ def sockets_of(
 
 
 def renamed(label: str, name: str = HOSTILE) -> Callable[[str], str]:
-    """Return a change by which something is called otherwise wherever its label stands alone."""
+    """Return a change that replaces a label wherever it stands alone."""
     return lambda text: text.replace(f'"{label}"', f'"{name}"')

@@ -12,9 +12,9 @@ import ssl
 import sys
 
 HEAD = b"GET /api/state HTTP/1.1\r\nHost: localhost\r\nX-Slow: "
-DRIP = 0.5  # from one byte of a slow request to the next [s]
-AGAIN = 0.05  # after a refused or cut connection [s]
-TOGETHER = 200  # that are opened at a time
+DRIP = 0.5  # interval between two bytes of a slow request [s]
+AGAIN = 0.05  # pause after a refused or cut connection [s]
+TOGETHER = 200  # number of connections opened at a time
 
 
 class Flood:
@@ -32,7 +32,7 @@ class Flood:
         self.opened = 0
 
     async def run(self, count: int) -> None:
-        """Hold so many connections open."""
+        """Hold a number of connections open."""
         kinds = [self.kinds[i % len(self.kinds)] for i in range(count)]
         self.kept = [asyncio.ensure_future(self.keep(kind)) for kind in kinds]
         while self.opened < count:

@@ -51,7 +51,7 @@ def checked(line: Mapping[str, Any], declared: Any = lines.WorldLine) -> dict[st
 
 
 def at_page(sent: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
-    """Messages of the web process to one page that looks at everything."""
+    """Messages of the web process to a page that subscribes to everything."""
     state, messages = RunState(), []
     feed = PageFeed(state, client)
     for line in sent:

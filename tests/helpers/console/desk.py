@@ -1,4 +1,4 @@
-"""The page Events, and what somebody does there who decides."""
+"""The page Events, and the actions of a person who decides there."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -8,24 +8,24 @@ from helpers.processes.patience import becomes
 from playwright.sync_api import Locator, Page, expect
 
 ASKS = "--set", "dispatch.mode=ask_first"
-"""Words for a console whose policy sends nobody by itself."""
+"""Arguments for a console whose policy sends nobody by itself."""
 NOTHING_YET = "--set", "events=[{kind: fire, at_s: 5000, latest_s: 5000}]"
-"""Words for one in which nothing happens but what a test raises."""
+"""Arguments for a console with only the events that a test raises."""
 NUMBERS = "rows => rows.map(row => row.dataset.event)"
 
 
 def row_of(page: Page, number: int) -> Locator:
-    """The row of an event, which puts it in hand."""
+    """Row of an event, which selects it."""
     return page.get_by_role("button", name=re.compile(f"^Event {number} "))
 
 
 def sends(page: Page, label: str = "") -> Locator:
-    """The button that sends somebody, with the time until they are there."""
+    """Button that sends a unit, with its time to arrival."""
     return page.get_by_role("button", name=re.compile(rf"^Send {label}.* (s|min)$"))
 
 
 def choose(page: Page, number: int) -> None:
-    """Put an event in hand, and wait for the policy's proposal, which moves all buttons down."""
+    """Select an event, and wait for the policy's proposal, which moves all buttons down."""
     row_of(page, number).click()
     panel = page.get_by_role("region", name="Event in hand")
     expect(panel.get_by_role("heading", level=2)).to_contain_text(f"{number} ")
@@ -34,14 +34,14 @@ def choose(page: Page, number: int) -> None:
 
 
 def another(page: Page) -> str:
-    """Choose a free guard other than the one whom the policy proposes; return the label."""
+    """Choose a free guard whom the policy does not propose; return the label."""
     guard = page.locator(".candidate").filter(has_text=re.compile("guard-.*free")).last
     guard.get_by_role("radio").check()
     return guard.locator("span").first.inner_text()
 
 
 def raised(page: Page, kind: str = "fire", room: str = "") -> int:
-    """Raise an event of one's own, for others decide on theirs; return its number."""
+    """Raise an event for this test alone; return its number."""
     page.get_by_role("button", name="Raise an event").click()
     page.get_by_label("Kind").select_option(label=kind)
     if room:

@@ -3,7 +3,7 @@
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
-LOOK_MS = 300  # from one look whether a robot is driven to the next
+LOOK_MS = 300  # interval of checks whether a robot is driven [ms]
 
 
 def take(page: Page) -> None:

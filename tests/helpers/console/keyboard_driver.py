@@ -1,4 +1,4 @@
-"""Somebody who drives by keys: turns, goes, waits; what they go by is where the robot is."""
+"""A driver with keys, who turns, moves and waits by the robot's true position."""
 
 import math
 import time
@@ -13,8 +13,8 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
 TURN_RATE = math.radians(30)
-LONGEST_S = 4.0  # of going straight on, before one looks again
-ROOM = 0.8  # between a straight way and the nearest wall, where there is so much [m]
+LONGEST_S = 4.0  # maximum time of driving straight between two looks [s]
+ROOM = 0.8  # gap between a straight path and the nearest wall, if possible [m]
 STEP = 0.1  # [m]
 AHEAD = 0.12  # a heading that will do [rad]
 FIRE = "events=[{kind: fire, room: North office, at_s: 3, latest_s: 3, reported: true}]"
@@ -30,7 +30,7 @@ class Driver:
         page: The page for driving.
         base: Address of the console.
         robot: Label.
-        delay: One-way delay of the link [s]: what is seen happened that long ago.
+        delay: One-way delay of the link [s], the age of what the driver sees.
     """
 
     def __init__(self, page: Page, base: str, robot: str, delay: float) -> None:
@@ -85,7 +85,7 @@ class Driver:
         return self._planner.line_of_sight(here, there) and bool(np.all(room >= least - 0.05))
 
     def _press(self, keys: set[str], seconds: float) -> None:
-        """Hold keys for a while, then see what has come of it."""
+        """Hold keys for a while, then wait until the effect is visible."""
         start(self._page, 1000 * (4 * self._delay + 0.5))
         self._hold(keys)
         self._page.wait_for_timeout(1000 * seconds)

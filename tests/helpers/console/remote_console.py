@@ -76,7 +76,7 @@ class RemotePage:
         self._count = 0
 
     def let(self, seconds: float) -> None:
-        """Let so much time go by."""
+        """Let a time pass [s]."""
         self.world.let(seconds)
 
     def lines_of(self, kind: str) -> list[dict[str, Any]]:
@@ -84,7 +84,7 @@ class RemotePage:
         return [line for line in self.lines if line["k"] == kind]
 
     def ask(self, what: str, /, within: float = 60.0, **about: Any) -> dict[str, Any]:
-        """An action, and its whole answer once it comes."""
+        """Send an action; return its complete answer."""
         self._count += 1
         number = f"action {self._count}"
         usual = {"id": number, "client": "c1", "role": "supervise", "do": what}
@@ -112,7 +112,7 @@ class RemotePage:
         return [row["text"] for row in self.lines_of("alarms")[-1]["alarms"]]
 
     def until(self, seen: Any, within: float = 120.0) -> None:
-        """Let time go by until something is so."""
+        """Let time pass until a condition holds."""
         self.world.until(seen, within)
 
     def written(self) -> list[AuditRow]:
@@ -122,7 +122,7 @@ class RemotePage:
 
 
 class NotedBench:
-    """A bench that appoints the console of a page, and notes what is asked of it."""
+    """A bench that appoints the console of a page, and notes its requests."""
 
     def __init__(self, page: RemotePage) -> None:
         self._dva = page.world.world.run.dva

@@ -69,7 +69,7 @@ def places(t: int, *rows: list[int]) -> Line:
 
 
 class Served:
-    """A web process; the test says what the simulation would say.
+    """A web process; the test plays the simulation.
 
     Args:
         words: More options.
@@ -103,7 +103,7 @@ class Served:
             self.end.sendall(json.dumps(line).encode() + b"\n")
 
     def hear(self, wait: float) -> bool:
-        """Take what is asked for within a moment: False if the process is gone."""
+        """Receive requests for at most `wait` [s]; return False if the process has ended."""
         ready, _, _ = select.select([self.end], [], [], wait)
         if not ready:
             return True
@@ -113,7 +113,7 @@ class Served:
         return bool(data)
 
     def next_asked(self, *kinds: str, asker: Future[Any] | None = None) -> Line:
-        """The next line of some kinds that the simulation is asked; others are forgotten."""
+        """Return the next request of these kinds; drop others."""
         ends = time.monotonic() + PATIENCE_S
         while time.monotonic() < ends:
             if asker is not None and asker.done() and asker.exception():
@@ -127,7 +127,7 @@ class Served:
         raise TimeoutError(f"nobody asked for {' or '.join(kinds)}")
 
     def asked_so_far(self) -> list[Line]:
-        """All that was asked and not looked at."""
+        """Return all unread requests."""
         while self.hear(0.0) and select.select([self.end], [], [], 0.05)[0]:
             pass
         found, self._asked = self._asked, []
@@ -138,7 +138,7 @@ class Served:
         return [line for line in self.asked_so_far() if line["do"] not in ("watch", "here")]
 
     def answering(self, kind: str, ask: Callable[..., Answer], *words: Any, **done: Any) -> Any:
-        """Let somebody ask, and do it in the simulation: the answer, and what was asked there."""
+        """Make a request, and answer it as the simulation; return the answer and that request."""
         with ThreadPoolExecutor(1) as other:
             reported = other.submit(ask, *words)
             asked = self.next_asked(kind, asker=reported)
@@ -150,7 +150,7 @@ class Served:
         self.pictures.sendall(pack(Picture(robot, number, captured, captured + 50, jpeg)))
 
     def live(self) -> None:
-        """Say that somebody draws."""
+        """Report that a painter draws."""
         self.pictures.sendall(pack(Picture(ALIVE, 0, 0, 0, b"")))
 
     # --- clients -------------------------------------------------------------------------
@@ -165,7 +165,7 @@ class Served:
         tls: ssl.SSLContext | None = None,
         **headers: str,
     ) -> Answer:
-        """A request, as rude as wanted, by https at the port for phones; names have `_` for `-`."""
+        """Send any request by https to the port for phones; header names have `_` for `-`."""
         port, kind = self.port, partial(http.client.HTTPConnection, timeout=PATIENCE_S)
         if tls is not None:
             port = self.phones_port
@@ -203,7 +203,7 @@ class Served:
             compression=None,
             max_size=None,
         )
-        return connection.__enter__()  # it is closed by whoever asked for it
+        return connection.__enter__()  # the caller closes it
 
     def page(self, token: str = "", **more: Any) -> Page:
         """A page that is open and has its first snapshot."""
@@ -226,7 +226,7 @@ class Served:
         return raw
 
     def stop(self) -> str:
-        """End it; what it complained about."""
+        """End the process; return its standard error."""
         with suppress(OSError):
             self.say({"k": "bye", "why": "the test is over"})
         try:

@@ -16,7 +16,7 @@ from dva_sim.simulation.scenario import build, load
 
 
 class VirtualPace(PacedClock):
-    """A paced clock whose real time is what a test says it is."""
+    """A paced clock whose real time is set by the test."""
 
     def pulse(self, period, action):
         def beat():
@@ -73,7 +73,7 @@ class Page:
         self.actions.take({"do": "here", "pages": dict.fromkeys(clients, role)})
 
     def do(self, what, /, within=30.0, client=None, **about):
-        """An action, and its answer once it comes."""
+        """Send an action; return its answer."""
         self._count += 1
         number = f"action {self._count}"
         self.actions.take({"id": number, "client": client or self.client, "do": what, **about})
@@ -104,7 +104,7 @@ class Page:
         self.world.clock.run(self.world.clock.now + seconds)
 
     def until(self, seen, within=60.0, step=0.1):
-        """Let time go by until something is so."""
+        """Let time pass until a condition holds."""
         end = self.world.clock.now + within
         while not seen():
             assert self.world.clock.now < end, f"not so within {within} s"

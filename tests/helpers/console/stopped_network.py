@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-LOOK_S = 0.05  # from one look at whether it is over to the next
+LOOK_S = 0.05  # interval of checks for the end [s]
 
 
 class StoppableNetwork:
@@ -18,7 +18,7 @@ class StoppableNetwork:
         port: Port of the console, on this machine.
 
     Attributes:
-        is_cut: True once nothing is forwarded any more, in either direction.
+        is_cut: True to drop all data in both directions.
     """
 
     def __init__(self, port: int) -> None:
@@ -55,9 +55,9 @@ class StoppableNetwork:
     def _accept(self) -> None:
         near, _ = self._listener.accept()
         far = socket.create_connection(self._target)
-        for one, other in ((near, far), (far, near)):
-            self._others[one] = other
-            self._selector.register(one, selectors.EVENT_READ)
+        for near_end, far_end in ((near, far), (far, near)):
+            self._others[near_end] = far_end
+            self._selector.register(near_end, selectors.EVENT_READ)
 
     def _forward(self, source: socket.socket) -> None:
         data = b""

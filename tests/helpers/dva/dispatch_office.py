@@ -1,4 +1,4 @@
-"""A core with a small team, for tests: what is said to it, what it wants said, and a plain map."""
+"""A core with a small team, for tests: its incoming and outgoing messages, and a plain map."""
 
 import math
 from collections.abc import Sequence
@@ -94,7 +94,7 @@ class Office:
             ask_first=self.ask_first,
         )
 
-    # --- what devices say --------------------------------------------------------------
+    # --- messages of devices -----------------------------------------------------------
 
     def register(
         self, id_tag: str, kind: str, at: float | None = None, now: float = 0.0
@@ -141,7 +141,7 @@ class Office:
         self.core.note(m.Message(DVA, 1, source, "12:00:00", session, body), now)
 
     def silence(self, device: str, now: float) -> None:
-        """A device has been quiet for so long that it counts as gone."""
+        """Let a device be silent for so long that it counts as absent."""
         for other in list(self.core.registry.entries):
             if other != device:
                 self.beat(other, now=now)
@@ -181,14 +181,14 @@ class Office:
     ) -> tuple[m.Reply, list[Send]]:
         return self.say(who, m.TaskBid(event, arrival_in), now)
 
-    # --- what becomes of what was sent -------------------------------------------------
+    # --- outcomes of sent messages -----------------------------------------------------
 
     def ok(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
-        """All of it is answered with OK."""
+        """Answer all messages with OK."""
         return self._after([s for send in sends for s in self.core.delivered(send, now)])
 
     def no(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
-        """All of it is declined, or does not arrive."""
+        """Let all messages be declined or lost."""
         return self._after([s for send in sends for s in self.core.undelivered(send, now)])
 
     def tick(self, now: float, alive: bool = True) -> list[Send]:
@@ -201,7 +201,7 @@ class Office:
         self.sent += sends
         return sends
 
-    # --- what is so --------------------------------------------------------------------
+    # --- state -------------------------------------------------------------------------
 
     def event(self, number: int = 1) -> Event:
         event = self.core.events.get(number)

@@ -18,7 +18,7 @@ from dva_sim.protocol import messages as m
 
 TABLE = Path(__file__).parents[3] / "protocol" / "models" / "event_table.pml"
 BEGAN, WAITS, LIMIT, MOST = 10.0, 60.0, 100.0, 3
-NOW = {False: 40.0, True: 75.0}  # before the deadline, and after it
+NOW = {False: 40.0, True: 75.0}  # times before the deadline and after it [s]
 
 STATES = {
     "PENDING": (),
@@ -54,7 +54,7 @@ class Case:
             self.happens(happening, BEGAN)
 
     def happens(self, what: str, now: float) -> None:
-        """Let something happen, if it can."""
+        """Apply an occurrence, if it is possible."""
         orders, event, state = self.core.orders, self.event, self.state
         is_order = state in ("ORDERED", "ACTOR_ORDERED")
         match what:

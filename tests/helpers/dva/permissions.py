@@ -31,7 +31,7 @@ def give(controller: RobotController, grant: m.PermissionGrant, now: float = 0.0
 
 
 def enter(core: Dva, robot: str, body: m.Body) -> None:
-    """Let a DVA's book say what it is made to tell a robot."""
+    """Set the answers of a DVA to a robot."""
     known = core.sessions.permissions
     if isinstance(body, m.PermissionGrant):
         address, sensors = body.address, body.sensors

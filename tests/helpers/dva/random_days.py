@@ -75,8 +75,8 @@ class Walk:
 
     Args:
         seed: Random seed.
-        folder: For the memory.
-        policy: By name; any if not given.
+        folder: Folder of the state file.
+        policy: Name of the policy; a random one by default.
     """
 
     def __init__(self, seed: int, folder: Path, policy: str | None = None) -> None:
@@ -130,7 +130,7 @@ class Walk:
     def _policy(self) -> Policy:
         return Chaos() if self.policy == "chaos" else POLICIES[self.policy]()
 
-    # --- what may happen ---------------------------------------------------------------
+    # --- random steps ------------------------------------------------------------------
 
     def step(self) -> None:
         """Something happens, and is written down."""
@@ -215,7 +215,7 @@ class Walk:
         return what(send, self.now)
 
     def _progress(self) -> list[Send]:
-        """Mostly of who has the order, and mostly about its event."""
+        """Report progress, mostly from the unit with the order and about its event."""
         working = self.core.orders.engaged
         device = self._any()
         if working and self.dice.random() < 0.8:
@@ -287,7 +287,7 @@ class Walk:
         return self.pass_time(min(math.ceil((due - self.now) * 8) / 8, 60.0) if due < 1e9 else 1.0)
 
     def pass_time(self, seconds: float) -> list[Send]:
-        """Time passes: who is alive is heard, and the core looks at its deadlines."""
+        """Let time pass: live devices send heartbeats, and the core checks its deadlines."""
         self.now += max(seconds, 0.125)
         for device, alive in self.alive.items():
             if alive:
@@ -314,7 +314,7 @@ class Walk:
         self.in_flight = [s for s in self.in_flight if self.dice.random() < 0.5]
         return self.core.orders.again()
 
-    # --- what must hold ----------------------------------------------------------------
+    # --- invariants --------------------------------------------------------------------
 
     def check(self, after: str) -> None:
         """All invariants."""
@@ -360,7 +360,7 @@ class Walk:
     # --- when all is well again --------------------------------------------------------
 
     def recover(self) -> float:
-        """Let everybody obey; returns the time until no event is open [s]."""
+        """Let all devices obey; return the time until no event is open [s]."""
         began, left = self.now, len(self.core.events.open)
         self.in_flight.clear()
         for device in DEVICES:
@@ -430,7 +430,7 @@ STEPS_OF_A_WALK = {
 
 
 def _watch(core: Dva) -> None:
-    """Nobody gets an order who has one."""
+    """Check that no device with an order gets another one."""
     confirm, act, orders = core.orders.confirm, core.orders.act, core.orders
 
     def watched_confirm(
@@ -452,7 +452,7 @@ def _watch(core: Dva) -> None:
 
 
 def snapshot(core: Dva) -> dict[str, Any]:
-    """All that a core must know again after it was killed."""
+    """Return the state that a core must restore after a kill."""
     events, permissions = core.events, core.sessions.permissions
     lasts = core.sessions.with_something_open()
     return {

@@ -39,7 +39,7 @@ WALKER = Walker(
 )
 POST = (1.4, 12.0)  # at the west end of the main corridor, which is straight [m]
 EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of that corridor [m]
-SETTLED = 0.01  # after this, what somebody said in answer has arrived [s]
+SETTLED = 0.01  # time after which replies have arrived [s]
 
 Point = tuple[float, float]
 
@@ -53,7 +53,7 @@ class Received(NamedTuple):
 
 
 class PretendedDva:
-    """Everybody but a real DVA.
+    """A scripted DVA and a team.
 
     Args:
         robots: Number of robots.
@@ -85,7 +85,7 @@ class PretendedDva:
         self.sessions: dict[str, m.PermissionGrant] = {}
         self._last_session = 0
 
-    # --- who is there ------------------------------------------------------------------
+    # --- the team ----------------------------------------------------------------------
 
     def guard(
         self,
@@ -141,10 +141,10 @@ class PretendedDva:
             assert self.now < end, f"has not come true within {limit} s"
             self.run_for(0.1)
 
-    # --- what is said ------------------------------------------------------------------
+    # --- messages ----------------------------------------------------------------------
 
     def say(self, to: str, body: m.Body) -> int:
-        """Tell somebody something: the code it is answered with."""
+        """Send a message to a device; return the code of the reply."""
         codes: list[int] = []
         self.device.ask(to, body, lambda reply: codes.append(reply.code))
         end = self.now + 1.0
@@ -195,7 +195,7 @@ class PretendedDva:
     def bids(self) -> list[m.TaskBid]:
         return [entry.body for entry in self.received if isinstance(entry.body, m.TaskBid)]
 
-    # --- what it hears -----------------------------------------------------------------
+    # --- received messages -------------------------------------------------------------
 
     def _hear(self, message: m.Message) -> m.Reply:
         body = message.body

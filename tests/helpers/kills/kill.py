@@ -35,9 +35,9 @@ class Moment(NamedTuple):
 
     Attributes:
         process: Part of the command line of the process that is stopped there.
-        event: Event of `sys.audit` that it is about to cause; `says`: the program has said it.
-        word: Part of the arguments of that event, or of what was said.
-        count: Its number.
+        event: Event of `sys.audit` before which it stops; `says`: the program's output.
+        word: Part of the arguments of that event, or of the output.
+        count: Number of the matching event.
         done: Number of runs that are finished by then, if that is known.
     """
 
@@ -52,7 +52,7 @@ class Kill(NamedTuple):
     """Row of the table: who, when, and what is done; `main` if to the program, not to its process.
 
     Attributes:
-        is_quick: It is one of those that are tried with each change.
+        is_quick: True if it is tried with each change.
     """
 
     subject: str
@@ -66,7 +66,7 @@ class Kill(NamedTuple):
         return f"{self.subject}: {self.deed}, at {what} of {who}"
 
 
-# --- what is done ----------------------------------------------------------------------
+# --- deeds -----------------------------------------------------------------------------
 
 
 class Victim(NamedTuple):
@@ -133,7 +133,7 @@ def mount(*words: str | Path) -> None:
 
 
 def mend(deed: str, out: Path) -> None:
-    """Give back what the deed has taken."""
+    """Undo the deed."""
     (out.parent / "time").unlink(missing_ok=True)
     if deed == "read-only":
         subprocess.run(["umount", out], check=True)
@@ -142,11 +142,11 @@ def mend(deed: str, out: Path) -> None:
         mount("-o", f"remount,{DISK}", out)
 
 
-# --- and what comes of it --------------------------------------------------------------
+# --- consequences ----------------------------------------------------------------------
 
 
 def troubles(kill: Kill, folder: Path, quiet: Path) -> list[str]:
-    """Return what was wrong, a line each.
+    """Return a line for each fault.
 
     Args:
         kill: Row of the table.

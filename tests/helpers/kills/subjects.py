@@ -1,4 +1,4 @@
-"""Programs that are killed: how each is called, and what must be true of its files afterwards."""
+"""Programs that are killed: their commands, and the conditions on their files afterwards."""
 
 import json
 import re
@@ -44,13 +44,13 @@ class Subject:
     """A command.
 
     Attributes:
-        words: Its command line.
+        words: Command line.
         product: Files of its folder, which must be the same as without a disturbance.
-        prepare: Puts into the folder what it needs.
-        goes_on: The same command completes what was interrupted.
-        ready: Words after which it is asked to end; empty: it ends by itself.
+        prepare: Function that puts the required files into the folder.
+        goes_on: True if the same command completes an interrupted one.
+        ready: Output after which it is asked to end; empty: it ends by itself.
         worker: Exit code if one of its processes is killed.
-        asked: Exit code if it is asked to end once it is under way.
+        asked: Exit code if it is asked to end while it runs.
     """
 
     words: tuple[str, ...]

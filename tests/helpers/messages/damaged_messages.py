@@ -96,7 +96,7 @@ def value_rewritten(data: bytes, rng: Random) -> bytes:
 
 
 def digit_changed(data: bytes, rng: Random) -> bytes:
-    """A digit, capital letter, point or sign becomes another: often still a message."""
+    """Change a digit, capital letter, point or sign; the result is often still a message."""
     start, end = _a_value(data, rng)
     if start == end:
         return data

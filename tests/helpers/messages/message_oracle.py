@@ -82,7 +82,7 @@ def judged(data: bytes) -> etree._Element | None:
 
 
 def _plain(root: etree._Element) -> bool:
-    """Elements and text in UTF-8, and nothing else."""
+    """Return True for elements and text in UTF-8 only."""
     document = root.getroottree().docinfo
     if document.doctype or document.xml_version != "1.0":
         return False

@@ -34,7 +34,7 @@ class Bug:
     """A bug that can be planted.
 
     Attributes:
-        name: Its name.
+        name: Name of the bug.
         rule: The rule that it breaks first.
         words: Description of the bug.
         place: Module and function, such as `dva_sim.core.orders:Orders.found`.
@@ -53,7 +53,7 @@ class Bug:
 
 
 RIGHT: Final = object()
-"""Stands for what the right function does."""
+"""Marker: do as the right function does."""
 
 
 def instead(decide: Callable[..., Any]) -> Make:

@@ -23,7 +23,7 @@ from helpers.mutation.faults import Mutant
 from helpers.mutation.scores import Trial
 from helpers.paths import ROOT
 
-PATIENCE_S = 900.0  # for all tests of a room
+PATIENCE_S = 900.0  # time-out for all tests of a room [s]
 HANGS_AFTER_S = 60.0  # a test that takes longer hangs: the longest takes a few seconds
 NOTHING_FAILED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 QUICK, PROGRAMS = "not system and not soak and not browser", "system and not soak and not browser"

@@ -16,7 +16,7 @@ SAMPLES = ROOT / "protocol" / "samples" / "valid"
 DVA = "02:00:00:00:00:01"
 TABLET = "56:2B:04:E4:56:D8"
 ROBOT = "70:1A:04:F9:81:D6"
-PERIOD_S = 0.2  # from one look of the robot at its sockets, and publication, to the next
+PERIOD_S = 0.2  # interval at which the robot reads its sockets and publishes [s]
 
 
 def printed(name: str, **values: object) -> str:
@@ -86,12 +86,12 @@ class PrintedRobot:
 
     Args:
         client: Client through which it registers.
-        id_tag: Its id.
-        label: Its name for people.
+        id_tag: Id of the robot.
+        label: Name for people.
         senses: True if it has sensors.
 
     Attributes:
-        heard: Requests to it.
+        heard: Requests received.
     """
 
     def __init__(

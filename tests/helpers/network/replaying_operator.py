@@ -1,4 +1,4 @@
-"""An operator who only repeats what one did before: the same messages, nobody who thinks."""
+"""An operator who repeats the messages of an earlier one."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
     """Repeat a run with an operator who neither looks nor tilts, but sends the same."""
 
     class TapePhone:
-        """Says what was said."""
+        """Sends the recorded messages."""
 
         hand_lag, keeps_alive, failures, first_failure = 0.0, tape.keeps_alive, 0, ""
         samples = values = 0

@@ -27,7 +27,7 @@ from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
-STEP = 0.02  # between two looks at whether it is over [s]
+STEP = 0.02  # interval of checks for the end [s]
 
 # Far above any gap between commands, so that nothing hangs on how fast a clock goes.
 PATIENT = {
@@ -89,7 +89,7 @@ Way = Callable[[ScriptedOperator, Witness], Script]
 
 
 def one_by_one(operator: ScriptedOperator, _: Witness) -> Script:
-    """The drill as it is: each command waits for the reply to the last one."""
+    """Perform the drill: each command waits for the reply to the last one."""
     return drill(operator)
 
 
@@ -222,7 +222,7 @@ class Scene(Patient):
 
 
 def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]:
-    """Let everybody do what they do until the operator is done and the robot knows."""
+    """Run until the operator is done and the robot knows."""
     scene = Scene(stage, trace)
     operator = scene.enters(1, lambda o: way(o, scene.witness))
     scene.until(lambda: operator.done and scene.robot.controller.grant is None)

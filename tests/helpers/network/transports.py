@@ -38,12 +38,12 @@ from dva_sim.worlds.geo import GeoFrame
 DVA, ROBOT, PHONE, TABLET = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
 NODES = (DVA, ROBOT, PHONE, TABLET)
 GUARD = "02:00:00:00:00:05"  # has a key like them, but is elsewhere
-STRANGER = "02:00:00:00:00:99"  # nobody was ever told where it is
+STRANGER = "02:00:00:00:00:99"  # id of a device with an unknown address
 
 BRIEF = 0.15  # a time-out that is meant to run out; an authenticated handshake fits in [s]
 PATIENT = PATIENCE_S  # one that is not [s]
-STEP = 0.005  # between two looks at a condition [s]
-DELAY = 0.001  # one way, in virtual time [s]
+STEP = 0.005  # interval of checks of a condition [s]
+DELAY = 0.001  # one-way delay in virtual time [s]
 
 VIRTUAL: dict[str, Callable[[], Connector]] = {
     "virtual messages": lambda: Connector(depth="message"),
@@ -69,7 +69,7 @@ class World:
         self.clock.run(self.clock.now + seconds)
 
     def run_until(self, condition: Callable[[], object], limit: float = PATIENCE_S) -> None:
-        """Let time pass until something is so."""
+        """Let time pass until a condition holds."""
         end = self.clock.now + limit
         while not condition():
             assert self.clock.now < end, f"has not come true within {limit} s"
@@ -87,7 +87,7 @@ class World:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Close whatever is open."""
+        """Close all open sockets."""
 
 
 class VirtualWorld(World):

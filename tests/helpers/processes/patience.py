@@ -32,7 +32,7 @@ class Patient:
     step_s = 0.01
 
     def until(self, true: Callable[[], object]) -> None:
-        """Let time pass until something is true."""
+        """Let time pass until a condition holds."""
         end = self.clock.now + PATIENCE_S
         while not true():
             assert self.clock.now < end, "has not come true"

@@ -20,7 +20,7 @@ def wait_until(condition: Callable[[], object], what: str) -> None:
     """Wait for as long as it takes.
 
     Raises:
-        TimeoutError: it took too long; `what` was waited for.
+        TimeoutError: it took too long; the message names `what`.
     """
     if not becomes(condition):
         raise TimeoutError(f"{what}: not within {PATIENCE_S:g} s")
@@ -121,7 +121,7 @@ class Programs:
         wait_until(lambda: not self.processes(), f"all end: {self.processes()}")
 
     def end_all(self) -> None:
-        """Leave nothing behind, whatever has happened."""
+        """End all processes in any case."""
         while processes := self.processes():
             for pid in processes:
                 with suppress(ProcessLookupError):
@@ -138,7 +138,7 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
 
 
 def all_gone_after(folder: Path) -> Iterator[Programs]:
-    """Programs that are ended, whatever happens."""
+    """Yield programs, which are ended in any case."""
     programs = Programs(folder)
     try:
         yield programs

@@ -25,7 +25,7 @@ class BridgedRobot(Patient):
     """The robot, its machine, and the DVA.
 
     Attributes:
-        heard: Requests to the DVA.
+        heard: Requests that the DVA has received.
         statuses: Status messages that the robot has published.
     """
 

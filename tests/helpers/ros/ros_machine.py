@@ -29,12 +29,12 @@ class RosMachine:
     """A robot behind a rosbridge server on a free port.
 
     Attributes:
-        heard: All operations that came, in order.
+        heard: All received operations, in order.
         commands: Speed and turn rate of each velocity command.
         x, y, heading, speed, turn_rate: State of the robot.
         obeys: True if it follows commands; otherwise it keeps its motion.
         tells: True if odometry is published.
-        lag: By so much odometry is older than it should be [s].
+        lag: Additional age of odometry [s].
         pictures: True if pictures are published.
     """
 
@@ -64,7 +64,7 @@ class RosMachine:
         self._thread.start()
 
     def stop(self) -> None:
-        """End all connections without a word, and serve no more."""
+        """End all connections without a close frame, and stop serving."""
         self._over.set()
         self._server.shutdown()
         for connection in list(self._open):

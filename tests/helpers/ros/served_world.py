@@ -63,7 +63,7 @@ class ScriptedRosClient:
     """A client of rosbridge that knows the protocol and nothing of us.
 
     Attributes:
-        came: All operations that came.
+        came: All received operations.
         refused: Status of a refused handshake.
         closed: Close code, once the connection is over.
     """
@@ -127,6 +127,6 @@ class ScriptedRosClient:
         return answer["values"] | {"result": answer["result"]}
 
     def leave(self) -> None:
-        """Be gone without a word."""
+        """Vanish without a close frame."""
         self._socket.socket.shutdown(2)
         self._socket.socket.close()

@@ -1,4 +1,4 @@
-"""Samples of what a process takes, and their growth in an hour, with an interval."""
+"""Samples of the resources of a process, and their growth per hour, with an interval."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-BLOCKS = 12  # of a time, each with its median: neighbouring samples are no news
+BLOCKS = 12  # number of blocks, each with its median, as neighbouring samples are alike
 T_975 = 2.228  # Student's t of 10 degrees of freedom, two blocks being used up by the line
 MB = 1e6
 
@@ -32,7 +32,7 @@ class Slope(NamedTuple):
 
 
 def taken_by(pid: int) -> Taken:
-    """Return what a process takes now.
+    """Return the resources of a process now.
 
     Raises:
         OSError: it has ended.

@@ -19,7 +19,7 @@ MAX_OF_A_KIND = 6
 
 
 class Visitor(Protocol):
-    """Somebody who has come."""
+    """One visitor."""
 
     def leave(self) -> object:
         """Go, without a word."""
@@ -94,8 +94,8 @@ class Visitors:
         doors: Functions that let one more of a kind in, by the kind.
 
     Attributes:
-        came: Number of those who came, by kind.
-        refused: Reasons why some were kept out, in one line each.
+        came: Number of visitors so far, by kind.
+        refused: Reasons of refusals, in one line each.
     """
 
     def __init__(self, doors: dict[str, Callable[[], Visitor]]) -> None:
@@ -105,7 +105,7 @@ class Visitors:
         self.refused: list[str] = []
 
     def step(self, rng: random.Random) -> None:
-        """Let somebody come, or go: of a kind that is full somebody goes."""
+        """Let a visitor come or go; one goes if its kind is full."""
         kind = rng.choice(sorted(self._doors))
         here = self._here[kind]
         if here and (len(here) >= MAX_OF_A_KIND or rng.random() < 0.5):
@@ -119,7 +119,7 @@ class Visitors:
         self.came[kind] += 1
 
     def leave(self) -> None:
-        """Let everybody go."""
+        """Let all visitors go."""
         for here in self._here.values():
             while here:
                 here.pop().leave()

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SLOW: Final = 5.0  # of CPU time for one figure [s]
+SLOW: Final = 5.0  # maximum CPU time of one figure [s]
 _SCALES: Final = (1.0, 100.0, 1000.0, 0.01, 0.001)  # a drawing may be in % or ms
-_NEAR: Final = 1e-6  # as a share: how exactly a CSV has a number
+_NEAR: Final = 1e-6  # relative precision of numbers in a CSV
 
 NEVER: Final = "is never drawn"
 RAISES: Final = "raises"
@@ -59,7 +59,7 @@ def check_figure(
     """See that a figure keeps what every figure promises, drawn twice of results of every shape.
 
     Args:
-        figure: Its class.
+        figure: Class of the figure.
         slow: A figure that takes longer earns a warning [s].
         shapes: Shapes of the results, by name.
 

@@ -109,7 +109,7 @@ def make_up(folder: Path, shape: Shape, columns: Iterable[str] = ()) -> Path:
     """Write a results folder.
 
     Args:
-        folder: It must not be there yet.
+        folder: Folder that does not exist yet.
         shape: Shape of the study.
         columns: Columns of the runs, besides all measures of the model.
     """

@@ -97,7 +97,7 @@ def drive_rows(persons: int, trials: int, effect_s: float = 12.0, missed: float 
 
     Args:
         persons: Simulated persons.
-        trials: Trials of each.
+        trials: Trials per person.
         effect_s: Extra time of request/reply at 1 s, growing with the delay squared.
         missed: Share of request/reply runs not confirmed at 1 s.
     """

@@ -71,13 +71,13 @@ def drive(
     """Drive a robot that does at once what it was asked for `delay` [s] ago.
 
     Args:
-        route: The way.
+        route: Route to follow.
         delay: A multiple of a frame [s].
         seconds: Length of the drive [s].
         start: Pose [m, rad].
         stop_before: So far before the end [m].
         reported_delay: Delay as the person perceives it, by time [s]; by default the true one.
-        frame: From one to the next [s].
+        frame: Interval between two frames [s].
     """
     x, y, heading = start
     late = round(delay / frame)

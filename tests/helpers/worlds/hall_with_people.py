@@ -80,6 +80,6 @@ class People:
         return not any(walking.walks for walking in self.walkings)
 
 
-def gap(one: Walking, other: Walking) -> float:
-    """Between two bodies [m]; negative where they overlap."""
-    return math.dist(one.place, other.place) - one.body.radius - other.body.radius
+def gap(first: Walking, second: Walking) -> float:
+    """Return the gap between two bodies [m]; negative where they overlap."""
+    return math.dist(first.place, second.place) - first.body.radius - second.body.radius
