@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 from dva_sim.kernel.errors import ConfigError, RunsFailed
 from dva_sim.kernel.retired import use_now
-from dva_sim.options.forms import documented, signature_of
+from dva_sim.options.forms import documented, make_signature
 from dva_sim.options.runs import EpisodeOptions, ReplayOptions
 from dva_sim.options.studies import (
     CompareOptions,
@@ -75,7 +75,7 @@ def _with(options: Callable[P, Options]) -> Callable[[Callable[[Options], T]], C
 
         about: Any = called
         about.__doc__ = documented(function.__doc__ or "", options)
-        about.__signature__ = signature_of(options, function.__annotations__["return"])
+        about.__signature__ = make_signature(options, function.__annotations__["return"])
         return called
 
     return give

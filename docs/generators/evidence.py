@@ -21,7 +21,7 @@ from dva_sim.validation.evidence import (
     passes,
     read_evidence,
 )
-from dva_sim.validation.evidence_page import LONG, TITLES, ResultSheet, sheets_of
+from dva_sim.validation.evidence_page import LONG, TITLES, ResultSheet, make_sheets
 from dva_sim.validation.figure import draw
 from generators.markdown import ROOT, code, prose, table
 from generators.markdown import page as page_of
@@ -101,7 +101,7 @@ def _comparisons() -> Iterator[str]:
 def _subject(title: str, lines: Sequence[Evidence]) -> Iterator[str]:
     """Yield the rule of a subject, and its lines group by group."""
     yield f"## {title}"
-    *groups, rule = sheets_of(lines, LONG)
+    *groups, rule = make_sheets(lines, LONG)
     for sheet in (rule, *groups):
         if sheet.rows or sheet.text:
             yield f"### {prose(sheet.title)}"

@@ -124,12 +124,12 @@ def _in_short(command: Command, room: int) -> str:
 def _made(name: str, command: Command) -> Any:
     if isinstance(command, typer.Typer):
         return get_group(command)
-    alone = typer_of(None)
+    alone = make_typer(None)
     alone.command(name, cls=CommandWithExamples, context_settings=HELP)(from_words(command))
     return get_command(alone)
 
 
-def typer_of(
+def make_typer(
     cls: type[PanelGroup] | None, help: str = "", add_completion: bool = False
 ) -> typer.Typer:
     """Return a Typer with our layout, of a group or of one command."""

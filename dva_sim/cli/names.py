@@ -141,7 +141,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers |= {trial.classes: _plugins_of(trial) for trial in TRIALS.values()}
+    makers |= {trial.classes: _find_plugins(trial) for trial in TRIALS.values()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
     return {name: list(made) for name, made in makers.items() if kind in (None, name)}
@@ -190,7 +190,7 @@ def _installed() -> Any:
     return entry_points()
 
 
-def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
+def _find_plugins(trial: CheckedKind) -> Iterator[NamedThing]:
     """Yield the shipped and installed classes; an installed one is loaded only when it is used."""
     values = {entry.name: f"of {entry.value}" for entry in _installed().select(group=trial.group)}
     for name, words in trial.words().items():

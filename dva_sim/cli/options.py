@@ -19,7 +19,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 from typer import Argument, Option
 
-from dva_sim.options.forms import MAX_SEED, OptionForm, forms_of, split
+from dva_sim.options.forms import MAX_SEED, OptionForm, make_forms, split
 
 Json = Annotated[bool, OptionForm("Print JSON, for other programs.", names=("--json",))]
 Quiet = Annotated[bool, OptionForm("Print only errors.", names=("-q", "--quiet"))]
@@ -38,7 +38,7 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
     parameters: list[Parameter] = []
     for name, parameter in inspect.signature(command).parameters.items():
         if name in classes:
-            parameters += _options_of(classes[name])
+            parameters += _make_parameters(classes[name])
             continue
         of, form = split(hints[name])
         parameters.append(
@@ -50,7 +50,7 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
     def call(**words: Any) -> None:
         values = {name: tuple(v) if isinstance(v, list) else v for name, v in words.items()}
         made = {
-            name: of(**{each: values.pop(each) for each in forms_of(of) if each in values})
+            name: of(**{each: values.pop(each) for each in make_forms(of) if each in values})
             for name, of in classes.items()
         }
         command(**made, **values)
@@ -60,9 +60,9 @@ def from_words(command: Callable[..., None]) -> Callable[..., None]:
     return call
 
 
-def _options_of(options: type) -> list[Parameter]:
+def _make_parameters(options: type) -> list[Parameter]:
     """Return parameters for the options of a class, except options only for programs."""
-    forms = forms_of(options)
+    forms = make_forms(options)
     return [
         _option(name, forms[name][0], form, parameter.default)
         for name, parameter in inspect.signature(options).parameters.items()

@@ -15,7 +15,7 @@ import typer
 
 from dva_sim import __version__
 from dva_sim.cli import answers, files, link, load, results, runs, site, storm, studies, users
-from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
+from dva_sim.cli.commands import Command, PanelGroup, Panels, make_typer, name_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
@@ -134,12 +134,12 @@ class DvaSimProgram(PanelGroup):
         "Single runs": {
             **_named(runs.episode, runs.replay, runs.live, runs.console),
             **_named(runs.robot, link.link, load.load, runs.keys),
-            "users": typer_of(UsersGroup, help="Add, change and lock users of a console."),
+            "users": make_typer(UsersGroup, help="Add, change and lock users of a console."),
         },
         "Listing, checking and validation": {
             **_named(files.list_, files.plugins, files.assumed, files.check),
             **_named(files.phone_log, files.schema, files.validate, storm.storm),
-            "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),
+            "site": make_typer(SiteGroup, help="Draw a site, or write it as files to edit."),
         },
     }
 
@@ -179,7 +179,7 @@ def _program(
 _NO_MEMORY = re.compile("map segment|start new thread|annot allocate memory|ut of memory")
 """Errors of libraries that found none."""
 
-app = typer_of(DvaSimProgram, add_completion=True)
+app = make_typer(DvaSimProgram, add_completion=True)
 app.callback()(_program)
 
 

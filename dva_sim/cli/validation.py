@@ -243,7 +243,7 @@ def _compared(
         task = bar.add_task("runs of the model", total=comparison.runs_in(groups, setting))
         comparisons = comparison.compare(groups, setting, lambda n: bar.update(task, completed=n))
     depths = ", ".join(
-        f"{depth} {count}" for depth, count in comparison.depths_of(comparisons).items()
+        f"{depth} {count}" for depth, count in comparison.count_depths(comparisons).items()
     )
     conditions = conditions | {
         "depth of the model, conditions": depths,

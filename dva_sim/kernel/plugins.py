@@ -92,7 +92,7 @@ class Plugins(Generic[T]):
         """
         factory = self.find(name, base)
         kept_options = dict(options or {})
-        word = word_of(name)
+        word = name_plugin(name)
         finish = None if factory in self.shipped.values() else self.finish
 
         def made(*arguments: Any) -> T:
@@ -118,7 +118,7 @@ class Plugins(Generic[T]):
                 a plug-in of this kind.
         """
         if not isinstance(name, str):
-            return self._right_class(word_of(name), name) if isinstance(name, type) else name
+            return self._right_class(name_plugin(name), name) if isinstance(name, type) else name
         return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
 
     def located(self, name: str, base: Path | None = None) -> str:
@@ -264,7 +264,7 @@ class Guard:
         self.first_failure = self.first_failure or problem
 
 
-def word_of(name: object) -> str:
+def name_plugin(name: object) -> str:
     """Return the name of a plug-in in messages."""
     return name if isinstance(name, str) else getattr(name, "__qualname__", repr(name))
 

@@ -32,14 +32,14 @@ def read_once(
         @wraps(read)
         def read_current(*arguments: Asked.args, **named: Asked.kwargs) -> Read:
             first = next(iter((*arguments, *named.values())))
-            return kept(tuple(map(version_of, files(first))), *arguments, **named)  # type: ignore[arg-type]
+            return kept(tuple(map(read_version, files(first))), *arguments, **named)  # type: ignore[arg-type]
 
         return read_current
 
     return decorate
 
 
-def version_of(file: Path) -> Version:
+def read_version(file: Path) -> Version:
     """Return the path of a file, and numbers that differ after any change; none if it is missing.
 
     They include the time of the last status change: copying or unpacking a file can set its

@@ -233,12 +233,12 @@ class RunLines:
     def _sent(self, when: float, source: str, destination: str, text: str) -> None:
         self._until(when)
         data = text.encode()
-        self._traffic_of.append(Sent(when, source, destination, len(data), data))
+        self._messages.append(Sent(when, source, destination, len(data), data))
 
     def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
         size = self.start["scenario"]["camera"]["frame_bytes"]
         frame = CameraFrame(read_observation(seen), captured)
-        self._traffic_of.append(Sent(when, robot, "", size, frame))
+        self._messages.append(Sent(when, robot, "", size, frame))
 
     def _here(self, when: float, _: list[str]) -> None:
         self._until(when)
@@ -248,7 +248,7 @@ class RunLines:
         self._until(when)
 
     @property
-    def _traffic_of(self) -> list[Sent]:
+    def _messages(self) -> list[Sent]:
         assert self.recorder.traffic is not None
         return self.recorder.traffic
 

@@ -191,7 +191,7 @@ class Condition:
         return cls(**{name: _read(name, str(row[name])) for name in CONDITION if name in row})
 
 
-def operator_of(
+def make_operator(
     condition: Condition, transport: CommandSockets, form: MessageForm, note: NoteTaker
 ) -> OperatorWorkload:
     """Return the operator's program of a condition, over any transport.

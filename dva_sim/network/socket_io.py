@@ -21,7 +21,7 @@ recv: Final = zmq.backend.Socket.recv
 send: Final = zmq.backend.Socket.send
 
 
-def next_of(socket: Socket) -> list[bytes] | None:
+def read_next(socket: Socket) -> list[bytes] | None:
     """Return the next message; None if all are read, or the last one closed the socket."""
     return None if socket.closed or not has_more(socket) else receive(socket)
 

@@ -35,7 +35,7 @@ from dva_sim.network.socket_io import (
     PublisherSocket,
     cut,
     drop_rest,
-    next_of,
+    read_next,
     receive,
     receive_parts,
     recv,
@@ -81,7 +81,7 @@ class SocketWire:
 
     def _replies(self) -> None:
         for _ in range(DRAIN):
-            frames = next_of(self._socket)
+            frames = read_next(self._socket)
             if frames is None:
                 return
             self._reply(frames)
@@ -175,7 +175,7 @@ class SocketSubscription:
 
     def _hear(self) -> None:
         for _ in range(DRAIN):
-            frames = None if self._paused else next_of(self._socket)
+            frames = None if self._paused else read_next(self._socket)
             if frames is None:
                 return
             if len(frames) == 2:

@@ -102,7 +102,7 @@ AnyPath = str | Path | None
 
 
 @cache
-def forms_of(options: Callable[..., Any]) -> dict[str, tuple[Any, OptionForm]]:
+def make_forms(options: Callable[..., Any]) -> dict[str, tuple[Any, OptionForm]]:
     """Return the types of a class's options, and their forms.
 
     Raises:
@@ -124,9 +124,9 @@ def split(hint: Any) -> tuple[Any, OptionForm | None]:
     return of, next((each for each in about if isinstance(each, OptionForm)), None)
 
 
-def signature_of(options: Callable[..., Any], returns: object) -> Signature:
+def make_signature(options: Callable[..., Any], returns: object) -> Signature:
     """Return the signature of a function that takes a class's options, each by its name."""
-    forms = forms_of(options)
+    forms = make_forms(options)
     parameters = signature(options).parameters.values()
     plain = [each.replace(annotation=forms[each.name][0]) for each in parameters]
     return Signature(plain, return_annotation=returns)
@@ -134,7 +134,7 @@ def signature_of(options: Callable[..., Any], returns: object) -> Signature:
 
 def documented(text: str, options: Callable[..., Any]) -> str:
     """Return a function's docstring with a class's options as its arguments."""
-    words = [f"    {name}: {form.for_programs}" for name, (_, form) in forms_of(options).items()]
+    words = [f"    {name}: {form.for_programs}" for name, (_, form) in make_forms(options).items()]
     about, ends, rest = cleandoc(text).partition("\n\nRaises:")
     about, returns, what = about.partition("\n\nReturns:")
     return "".join([about, "\n\nArgs:\n", "\n".join(words), returns, what, ends, rest])

@@ -78,8 +78,8 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> SensorLog:
     times = [numbers[0] for _, numbers in numbered]
     axes = [numbers[1:] for _, numbers in numbered]
     guesses = list[str]()
-    second = _second_of(times, columns, path, guesses)
-    metre = _metre_of(axes, columns, unit, path, guesses)
+    second = _find_second(times, columns, path, guesses)
+    metre = _find_metre(axes, columns, unit, path, guesses)
     _require_gravity(axes, metre, (times[-1] - times[0]) * second if times else 0.0, path)
     samples = list[MotionSample]()
     for number, (time, x, y, z) in numbered:
@@ -138,7 +138,9 @@ def _numbers(
     return time, x, y, z
 
 
-def _second_of(times: Sequence[float], columns: _Columns, path: Path, guesses: list[str]) -> float:
+def _find_second(
+    times: Sequence[float], columns: _Columns, path: Path, guesses: list[str]
+) -> float:
     """Return the seconds in one unit of time: by the header, else by the spacing of samples."""
     head = columns.names[columns.time] if columns.names else ""
     named = re.search(r"[\[(_ ]\s*(s|ms|us|µs|ns)\s*[\])]?$", head)
@@ -157,7 +159,7 @@ def _second_of(times: Sequence[float], columns: _Columns, path: Path, guesses: l
     return fitting[0]
 
 
-def _metre_of(
+def _find_metre(
     axes: Sequence[Sequence[float]],
     columns: _Columns,
     unit: Unit | None,

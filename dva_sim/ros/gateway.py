@@ -23,7 +23,7 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
 from dva_sim.ros.mjpeg import MjpegReader
-from dva_sim.ros.published import namespace_of
+from dva_sim.ros.published import make_namespace
 from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.stage import Stage
 
@@ -270,7 +270,7 @@ class RosGateway:
             if device.id_tag in id_tags:
                 self.device.introduce(device.id_tag, device.address)
             else:
-                name = namespace_of(device.label)
+                name = make_namespace(device.label)
                 while name in self.robots:
                     name += "_"
                 self.robots[name] = KnownRobot(device.id_tag, name, device.label)

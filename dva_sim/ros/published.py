@@ -19,20 +19,20 @@ REACH_M: Final = 8.0  # range of the lidar [m]
 Json = dict[str, Any]
 
 
-def namespace_of(label: str) -> str:
+def make_namespace(label: str) -> str:
     """Return a label as a valid name in ROS: `robot-1` becomes `robot_1`."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", label)
     return name if name[:1].isalpha() else f"r{name}"
 
 
-def time_of(now: float) -> Json:
+def make_time(now: float) -> Json:
     """Return a time [s] as builtin_interfaces/Time."""
     seconds, nanoseconds = divmod(round(now * 1e9), 1_000_000_000)
     return {"sec": seconds, "nanosec": nanoseconds}
 
 
 def _header(now: float, frame: str) -> Json:
-    return {"stamp": time_of(now), "frame_id": frame}
+    return {"stamp": make_time(now), "frame_id": frame}
 
 
 def _turned(heading: float) -> Json:
@@ -96,7 +96,7 @@ def scan(name: str, ranges: Sequence[float], now: float) -> Json:
 
 def clock(now: float) -> Json:
     """Return rosgraph_msgs/Clock: the time of the run."""
-    return {"clock": time_of(now)}
+    return {"clock": make_time(now)}
 
 
 def picture(name: str, jpeg: bytes, captured: float) -> Json:
@@ -119,7 +119,7 @@ def occupancy(grid: OccupancyGrid) -> Json:
     return {
         "header": _header(0.0, MAP),
         "info": {
-            "map_load_time": time_of(0.0),
+            "map_load_time": make_time(0.0),
             "resolution": grid.resolution * step,
             "width": columns,
             "height": rows,

@@ -351,4 +351,4 @@ class RosbridgeServer:
             case "nodes":
                 return {"nodes": ["/dva_sim"]}
             case _:
-                return {"time": published.time_of(self._clock.now)}
+                return {"time": published.make_time(self._clock.now)}

@@ -128,7 +128,7 @@ _SHARED: Final = tuple(
 """Modules of objects that no agent fills: checkers, the world, the scenario."""
 
 
-def waiting_of(inbox: CommandQueue, peer: str) -> int:
+def count_waiting(inbox: CommandQueue, peer: str) -> int:
     """Return how many messages of one connection wait in a robot's queue."""
     queues = inbox._waiting._queues.items()
     return sum(len(queue) for (whose, _), queue in queues if whose == peer)

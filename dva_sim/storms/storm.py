@@ -20,7 +20,13 @@ from dva_sim.kernel.recorder import Accepted
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.storms.checkers import AnswerWatch, RefusedDrivers, is_waiting, oversized, waiting_of
+from dva_sim.storms.checkers import (
+    AnswerWatch,
+    RefusedDrivers,
+    count_waiting,
+    is_waiting,
+    oversized,
+)
 from dva_sim.storms.faults import FAULTS
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.outcome import StormOutcome
@@ -189,7 +195,7 @@ class Storm(StormScene):
     def _look_at_queues(self) -> None:
         stranger = self.flooder.device.id_tag
         for robot in self.robots:
-            waits = waiting_of(robot.agent.inbox, stranger)
+            waits = count_waiting(robot.agent.inbox, stranger)
             if waits > PER_CONNECTION:
                 what = f"lets {waits} messages of a stranger wait, more than {PER_CONNECTION}"
                 self.recorder.violated("S10", self.now, robot.agent.device.label, what)

@@ -151,10 +151,10 @@ def headline(lines: Sequence[Evidence]) -> str:
         missed = f"; those that do not, of {len(misses)} conditions, are in the tables"
     elif misses:
         missed = f"; these do not: {'; '.join(misses)}"
-    return f"{count_of(lines)}{missed}. {state_of_rule(lines)}"
+    return f"{describe_count(lines)}{missed}. {state_of_rule(lines)}"
 
 
-def count_of(lines: Iterable[Evidence]) -> str:
+def describe_count(lines: Iterable[Evidence]) -> str:
     """Return the number of lines that hold, and the number of lines with a verdict."""
     verdicts = [line.verdict for line in judged(lines)]
     rough = verdicts.count("too rough")

@@ -23,7 +23,7 @@ from dva_sim.validation.evidence import (
     SUBJECTS,
     Evidence,
     Subject,
-    count_of,
+    describe_count,
     headline,
     judged,
     names_of_misses,
@@ -100,7 +100,7 @@ class ValidationResult:
     @property
     def printed(self) -> list[ResultSheet]:
         """Tables for a terminal, in order."""
-        *groups, rule = sheets_of(self.lines, LONG)
+        *groups, rule = make_sheets(self.lines, LONG)
         sheets = [sheet for sheet in groups if sheet.rows or sheet.text]
         return [*sheets, *not_judged(self.lines), *self.sheets, rule]
 
@@ -139,7 +139,7 @@ class ValidationResult:
         return path
 
 
-def sheets_of(lines: Sequence[Evidence], most: int | None = None) -> list[ResultSheet]:
+def make_sheets(lines: Sequence[Evidence], most: int | None = None) -> list[ResultSheet]:
     """Return a sheet for each group of the lines of a subject, the rule last.
 
     Args:
@@ -159,7 +159,7 @@ def _sheet(title: str, lines: Sequence[Evidence], most: int | None) -> ResultShe
     if most is not None and len(lines) > most:
         # A terminal would scroll the head away.
         printed = [line for line in lines if line.verdict in ("misses", "too rough")]
-        text = f"{count_of(lines)}." if judged(lines) else ""
+        text = f"{describe_count(lines)}." if judged(lines) else ""
     rows: list[tuple[str, ...]] = []
     for source, own in groupby(printed, lambda line: line.source):
         rows += [(source,)] if source else []
@@ -198,11 +198,11 @@ def page(result: ValidationResult, lines: Sequence[Evidence], drawn: Sequence[Dr
         titles=TITLES,
         methods=load_yaml(Path(__file__).parent / "templates/methods.yaml").data,
         subjects={subject: own for subject, own in by_subject.items() if own},
-        count=count_of,
+        count=describe_count,
         misses=names_of_misses,
         rule=state_of_rule,
         passes=passes,
-        sheets=sheets_of,
+        sheets=make_sheets,
         long=LONG,
     )
 

@@ -18,7 +18,7 @@ Key = tuple[str, int]
 Progress = Callable[[int], None]
 
 
-def job_of(
+def make_job(
     name: str, seed: int, scenario: object, *, person: int = 0, **asked: str | int
 ) -> StudyJob:
     """Return a job of a validation.

@@ -28,7 +28,7 @@ from dva_sim.worlds.site_parts import (
     QUALITIES,
     LinkQuality,
 )
-from dva_sim.worlds.storeys import storeys_of, to_choose_from
+from dva_sim.worlds.storeys import parse_storeys, to_choose_from
 
 
 class DrawnFeature(BaseModel):
@@ -184,7 +184,7 @@ def read_features(path: Path, frame: GeoFrame, level: str | None = None) -> Iter
     collection = _collection(path, text)
     crs = _crs(collection)
     kinds = set()
-    on = [storeys_of(_properties(data)) for data in collection["features"]]
+    on = [parse_storeys(_properties(data)) for data in collection["features"]]
     _require_storey(path, on, level)
     for index, data in enumerate(collection["features"]):
         if level is not None and on[index] and level not in on[index]:
@@ -204,7 +204,7 @@ def storeys(path: Path) -> list[str]:
         ConfigError: not GeoJSON.
     """
     features = _collection(path, read_text(path))["features"]
-    return to_choose_from(map(storeys_of, map(_properties, features)))
+    return to_choose_from(map(parse_storeys, map(_properties, features)))
 
 
 def doubts_of_plan(path: Path) -> list[str]:

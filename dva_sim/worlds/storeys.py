@@ -20,7 +20,7 @@ def label_of(level: object) -> str:
         return text
 
 
-def storeys_of(properties: Mapping[str, Any]) -> frozenset[str]:
+def parse_storeys(properties: Mapping[str, Any]) -> frozenset[str]:
     """Return the storeys that a feature is on, such as 0 and 1 for `0;1`; empty for all."""
     labels = set[str]()
     for key in (LEVEL, _REPEATED) if properties.get(LEVEL) not in (None, "") else ():

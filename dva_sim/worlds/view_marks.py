@@ -58,7 +58,7 @@ def points_per_metre(ax: Axes) -> float:
     return float(min(across, up)) * POINTS_PER_INCH
 
 
-def scale_of(ax: Axes) -> float:
+def choose_scale(ax: Axes) -> float:
     """Return the size of marks: smaller on a large site, but not in proportion."""
     return min(1.1, max(0.45, math.sqrt(points_per_metre(ax) / FULL_SIZE)))
 
@@ -82,11 +82,11 @@ def draw_equipment(ax: Axes, site: Site, small_marks: bool = True) -> None:
 def _mark(
     ax: Axes, at: Pose | FixedCamera | BaseStation, marker: Any, size: float, **style: Any
 ) -> None:
-    ax.plot(at.x, at.y, marker=marker, ms=size * scale_of(ax), **style)
+    ax.plot(at.x, at.y, marker=marker, ms=size * choose_scale(ax), **style)
 
 
 def _draw_detectors(ax: Axes, site: Site) -> None:
-    size = 2.6 * scale_of(ax)
+    size = 2.6 * choose_scale(ax)
     for kind, (marker, colour) in DETECTORS.items():
         points = [(d.x, d.y) for d in site.detectors if d.kind == kind]
         if points:
@@ -108,7 +108,7 @@ def _draw_desks(ax: Axes, site: Site) -> None:
         table = Rectangle((0.25, -0.7), 0.7, 1.4, fc=DESK, ec=INK, lw=0.5, zorder=3.5)
         table.set_transform(turn)
         ax.add_patch(table)
-        ax.plot(desk.x, desk.y, "o", ms=2.6 * scale_of(ax), color=INK, zorder=3.5)
+        ax.plot(desk.x, desk.y, "o", ms=2.6 * choose_scale(ax), color=INK, zorder=3.5)
 
 
 def draw_views(ax: Axes, site: Site) -> None:

@@ -39,7 +39,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.operator.published import TargetLine, lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import TargetLine, load_split, load_targets, target_lines
 from dva_sim.experiments.study.factor_levels import latin_hypercube
 from dva_sim.kernel.streams import Streams
 from dva_sim.validation.operators.experiments import EXPERIMENTS, OperatorsSetting, play_experiments
@@ -178,7 +178,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Fit the operators' medians.")
     parser.add_argument("--jobs", type=int, default=2)
     split = load_split()
-    lines = [line for line in lines_of(load_targets(), split) if line.kind == "fitted"]
+    lines = [line for line in target_lines(load_targets(), split) if line.kind == "fitted"]
     workers = parser.parse_args().jobs
     setting = OperatorsSetting(split.strategy, persons=PERSONS, quick=True, workers=workers)
     tried = search(lambda traits, seed: loss(lines, replace(setting, traits=traits, seed=seed)))

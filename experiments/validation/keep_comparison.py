@@ -13,7 +13,7 @@ import csv
 import sys
 from pathlib import Path
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.validation.evidence import read_evidence
 
 HISTORY = Path(__file__).with_name("operators-history.csv")
@@ -24,7 +24,7 @@ def keep(name: str, evidence: Path, history: Path = HISTORY) -> None:
     split = load_split()
     if name not in split.comparisons:
         raise SystemExit(f"operators-split.yaml has no comparison {name!r}: write it there first")
-    ids = {line.id for line in lines_of(load_targets(), split)}
+    ids = {line.id for line in target_lines(load_targets(), split)}
     values = {e.line: e.predicted for e in read_evidence(evidence) if e.line in ids}
     with history.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file)

@@ -17,8 +17,8 @@ from dva_sim.agents.people.pedestrian_avoidance import (
     Mover,
     beside,
     doors_on,
+    find_middles,
     is_clear,
-    middles_of,
     velocity,
 )
 from dva_sim.agents.people.profiles import FASTEST, SLOWEST, PaceProfile
@@ -140,7 +140,7 @@ def body(x, y, vx=0.0, vy=0.0):
 def test_the_doors_of_a_way_are_found_in_its_order_and_wide_ones_need_no_manners():
     ends = np.array([[7, -0.5, 7, 0.5], [3, -0.5, 3, 0.5], [5, -2, 5, 2], [5, 8, 5, 9]], float)
     way = np.stack([np.arange(0, 10.01, 0.25), np.zeros(41)], 1)
-    doors = doors_on(way, middles_of(ends, USUAL.narrow_m))
+    doors = doors_on(way, find_middles(ends, USUAL.narrow_m))
     assert [(d.along, d.x) for d in doors] == [(3.0, 3.0), (7.0, 7.0)]
     assert doors_on(way, np.empty((0, 2))) == []
 

@@ -16,7 +16,7 @@ from dva_sim.cli import app
 from dva_sim.cli.commands import CommandWithExamples
 from dva_sim.cli.options import Quiet, from_words
 from dva_sim.options import runs, studies
-from dva_sim.options.forms import OptionForm, argument, forms_of
+from dva_sim.options.forms import OptionForm, argument, make_forms
 
 PROGRAM = typer.main.get_command(app)
 COMMANDS = {name: PROGRAM.get_command(None, name) for name in PROGRAM.list_commands(None)}
@@ -49,7 +49,7 @@ def test_a_function_takes_the_options_of_its_command_with_their_defaults_and_wor
         n: p.default for n, p in inspect.signature(declared).parameters.items()
     }
     text = " ".join(inspect.getdoc(function).split())
-    for each, (_, form) in forms_of(declared).items():
+    for each, (_, form) in make_forms(declared).items():
         assert f" {each}: {form.for_programs}" in text
 
 
@@ -73,7 +73,7 @@ def test_each_option_of_each_command_has_words():
 
 @pytest.mark.parametrize("options", CLASSES)
 def test_each_option_has_words_for_programs(options):
-    assert [name for name, (_, form) in forms_of(options).items() if not form.for_programs] == []
+    assert [name for name, (_, form) in make_forms(options).items() if not form.for_programs] == []
 
 
 def test_a_function_refuses_what_its_command_does_not_know():

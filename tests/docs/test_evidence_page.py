@@ -7,7 +7,7 @@ import generators
 import pytest
 from generators import evidence
 
-from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import load_split, load_targets, target_lines
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.evidence import RULE, SUBJECTS, judged, passes
@@ -48,7 +48,7 @@ def test_every_line_that_misses_has_a_row_with_its_source_or_the_one_above(subje
 
 
 def test_kept_lines_of_operators_are_those_of_the_targets():
-    lines = lines_of(load_targets(), load_split())
+    lines = target_lines(load_targets(), load_split())
     kept = claims("operators")
     for today in judge(lines, {}):
         then = kept[today.line]

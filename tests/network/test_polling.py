@@ -8,7 +8,7 @@ from helpers.processes.patience import becomes
 
 from dva_sim.network import realtime
 from dva_sim.network.realtime import LiveClock, Poller, has_more
-from dva_sim.network.socket_io import cut, next_of
+from dva_sim.network.socket_io import cut, read_next
 
 Socket = zmq.Socket[bytes]
 Make = Callable[[int], Socket]
@@ -105,7 +105,7 @@ def test_a_subscription_can_be_cut_while_a_poll_has_begun_a_message(make):
 
     assert becomes(arrives)
     cut(subscriber)
-    assert next_of(subscriber) is None
+    assert read_next(subscriber) is None
 
 
 def test_a_clock_that_is_behind_reads_messages_all_the_same(make):

@@ -18,7 +18,7 @@ from dva_sim.validation.evidence import (
     share_rule,
     short_number,
 )
-from dva_sim.validation.evidence_page import LONG, NAME, ValidationResult, sheets_of
+from dva_sim.validation.evidence_page import LONG, NAME, ValidationResult, make_sheets
 
 AGE = Evidence(
     "network",
@@ -110,9 +110,9 @@ def test_a_share_that_is_reached_but_for_rounding_holds():
 
 def test_of_a_long_group_a_terminal_shows_what_does_not_hold_and_the_number_that_does():
     many = [replace(AGE, line=f"pub{n} age_p50") for n in range(LONG)]
-    [whole, _] = sheets_of(many, LONG)
+    [whole, _] = make_sheets(many, LONG)
     assert len(whole.rows) == 1 + LONG  # their source, and all
-    [cut, _] = sheets_of([*many, LATE], LONG)
+    [cut, _] = make_sheets([*many, LATE], LONG)
     assert cut.rows == [("real sockets",), LATE.words]
     assert cut.text == f"{LONG} of {LONG + 1} lines hold."
 

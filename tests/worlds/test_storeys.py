@@ -8,7 +8,7 @@ from helpers.worlds.small_site import feature, square, write_site
 
 from dva_sim.testing.files import check_file
 from dva_sim.worlds.site import load_site
-from dva_sim.worlds.storeys import label_of, storeys_of
+from dva_sim.worlds.storeys import label_of, parse_storeys
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ from dva_sim.worlds.storeys import label_of, storeys_of
     ],
 )
 def test_a_level_names_one_storey_or_several(properties, storeys):
-    assert storeys_of(properties) == storeys
+    assert parse_storeys(properties) == storeys
     assert label_of(0.0) == label_of("0") == "0"
 
 

@@ -408,7 +408,7 @@ def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, LineKind]) 
 
 
 @cache
-def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
+def read_supports(strategy: str) -> tuple[SupportConfig, ...]:
     """Return the ranges known for a strategy, from short delays on; empty without data.
 
     The delay is that of everything but the person: filter, sampling, link, computers, frames.
@@ -426,5 +426,5 @@ def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, flo
         strategy: Strategy of the operators.
         steering: `closed` or `waiting`: restricts the data to people who steered so.
     """
-    supports = supports_of(strategy)
+    supports = read_supports(strategy)
     return tuple((s.low_s, s.high_s) for s in supports if steering in (None, s.steering))

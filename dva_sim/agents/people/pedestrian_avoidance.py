@@ -147,7 +147,7 @@ class Door:
     y: float
 
 
-def middles_of(doors: Floats, narrow: float) -> Floats:
+def find_middles(doors: Floats, narrow: float) -> Floats:
     """Middles `(k, 2)` of those doors, given by their ends `(n, 4)`, narrower than that [m]."""
     widths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
     middles: Floats = 0.5 * (doors[:, :2] + doors[:, 2:])

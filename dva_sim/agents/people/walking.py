@@ -32,8 +32,8 @@ from dva_sim.agents.people.pedestrian_avoidance import (
     Point,
     beside,
     doors_on,
+    find_middles,
     is_clear,
-    middles_of,
     past,
     velocity,
 )
@@ -115,7 +115,7 @@ class Walking:
         self.speed = speed
         self.heading = 0.0
         self.pace = 1.0
-        self._doors = middles_of(doors, own.narrow_m)
+        self._doors = find_middles(doors, own.narrow_m)
         self._walk: Walk | None = None
         self._reach = own.reach_m  # less in a crowd
 

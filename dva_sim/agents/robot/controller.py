@@ -416,7 +416,7 @@ class RobotController:
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Decide on a subscription to a sensor; permissions name each sensor (S5)."""
-        grants = self._grants_of(message.source)
+        grants = self._find_grants(message.source)
         if body.sensor not in {sensor.name for sensor in self.sensors}:
             names: Iterable[str] = (sensor.name for sensor in self.sensors)
             offer = f"there are {', '.join(names) or 'none'}"
@@ -452,9 +452,9 @@ class RobotController:
 
     def may_read(self, device: str, sensor: str) -> bool:
         """Return True if a device holds a permission to read a sensor."""
-        return any(sensor in grant.sensors for grant in self._grants_of(device))
+        return any(sensor in grant.sensors for grant in self._find_grants(device))
 
-    def _grants_of(self, device: str) -> list[m.PermissionGrant]:
+    def _find_grants(self, device: str) -> list[m.PermissionGrant]:
         grants = (self.grant, self.observers.get(device))
         return [grant for grant in grants if grant is not None and grant.holder == device]
 

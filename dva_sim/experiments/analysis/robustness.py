@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.operator.published import ranges, supports_of
+from dva_sim.agents.operator.published import ranges, read_supports
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, Table, nan_mean
@@ -125,7 +125,7 @@ def _has(part: RunGrid, strategy: str, default: str) -> Marks:
 def _coverage(strategy: str) -> str:
     lines = [
         f"{support.low_s:g} to {support.high_s:g} s, {' '.join(support.why.split())}"
-        for support in supports_of(strategy)
+        for support in read_supports(strategy)
     ]
     return f"{strategy}: {', and '.join(lines) or 'no published data'}"
 

@@ -37,7 +37,7 @@ from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import edited_files, files_of, folders_of_files
 from dva_sim.experiments.study.plan import Progress, StudyPlan
 from dva_sim.kernel.errors import ConfigError, DvaSimError
-from dva_sim.kernel.read_once import Version, version_of
+from dva_sim.kernel.read_once import Version, read_version
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.options.studies import RunOptions
 
@@ -283,7 +283,7 @@ class FileWatch:
         Raises:
             ConfigError: a file was written or deleted, or a new one hides it.
         """
-        if tuple(map(version_of, self._places)) == self._seen:
+        if tuple(map(read_version, self._places)) == self._seen:
             return
         now = self._look()
         changed = [
@@ -298,9 +298,9 @@ class FileWatch:
     def _look(self) -> dict[str, Version]:
         """Return the version of each file by name."""
         folders = list(self._folders())
-        folder_versions = tuple(map(version_of, folders))
+        folder_versions = tuple(map(read_version, folders))
         files = dict(self._files())
-        versions = {name: version_of(path) for name, path in files.items()}
+        versions = {name: read_version(path) for name, path in files.items()}
         self._places = (*folders, *files.values())
         self._seen = (*folder_versions, *versions.values())
         return versions

@@ -11,7 +11,7 @@ from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.delays import ConstantDelay, DelayLaw
 from dva_sim.network.link.losses import Bursts
 from dva_sim.network.link.outages import Outage, Partition
-from dva_sim.network.link.replay import moments_of
+from dva_sim.network.link.replay import compute_moments
 
 Direction = Literal["up", "down"]
 Seconds = Annotated[float, Field(ge=0, le=30)]
@@ -145,7 +145,7 @@ class LinkConfig(Config):
             ConfigError: a file cannot be read.
         """
         if self.delay_log is not None:
-            mean, sd = moments_of(read_delay_log(self.delay_log))
+            mean, sd = compute_moments(read_delay_log(self.delay_log))
             return self.delay_s + self.delay_log_share * mean, self.delay_log_share * sd
         if self.law is not None:
             return self.law.moments(self.delay_s)

@@ -22,10 +22,10 @@ from dva_sim.network.link.config import Direction, LinkConfig
 from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.delays import Wobble, by_quantile
 from dva_sim.network.link.losses import Fate, chance
-from dva_sim.network.link.outages import Gap, Partition, gaps_of
+from dva_sim.network.link.outages import Gap, Partition, lose_in_gaps
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import read_trace
-from dva_sim.network.link.replay import Replay, period_of
+from dva_sim.network.link.replay import Replay, find_period
 from dva_sim.network.link.time_noise import FastNoise, MakeNumbers, PacketNumbers
 
 MIN_PACKET = 40  # IPv4 and TCP headers alone [B]
@@ -90,7 +90,7 @@ class Link:
         self._base = link.delay_s
         drawing = self._streams, self.name, self._make_numbers
         self._fates = _make_fates(link, replay, *drawing)
-        self._outage = gaps_of(link.outages) if link.outages else None
+        self._outage = lose_in_gaps(link.outages) if link.outages else None
         self._wobble = replay.deviation if replay else _make_wobble(link, *drawing)
         self._may_overtake = link.reorder
         self._is_steady = not self._fates and self._outage is None and self._wobble is None
@@ -246,7 +246,7 @@ def _make_replay(
         return None
     log = read_delay_log(link.delay_log)
     rng = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
-    offset = rng.random() * period_of(log)
+    offset = rng.random() * find_period(log)
     coins = rng.random(len(log.times))
     share = link.delay_log_share
     here = coins < share if direction == "up" else coins >= 1.0 - share

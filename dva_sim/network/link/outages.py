@@ -65,6 +65,6 @@ class Partition(Gap):
         return fnmatchcase(source, self.source) and fnmatchcase(destination, self.destination)
 
 
-def gaps_of(gaps: Sequence[Gap]) -> Fate:
+def lose_in_gaps(gaps: Sequence[Gap]) -> Fate:
     """Return a fate that loses everything during gaps."""
     return lambda now, left_at: any(gap.covers(left_at) for gap in gaps)

@@ -26,7 +26,7 @@ class Replay:
 
     def __init__(self, log: DelayLog, share: float, here: Flags, offset: float) -> None:
         times = log.times - log.times[0]
-        self._period = period_of(log)
+        self._period = find_period(log)
         self._ends = (0.5 * (times + np.append(times[1:], self._period))).tolist()
         self._delays = _filled(share * log.delays).tolist()
         self._lost = (np.isnan(log.delays) & here).tolist()
@@ -45,13 +45,13 @@ class Replay:
         return index if index < len(self._ends) else 0  # nearer to where the log begins again
 
 
-def period_of(log: DelayLog) -> float:
+def find_period(log: DelayLog) -> float:
     """Return the period after which a log repeats [s]: a typical step after its last probe."""
     steps = np.diff(log.times)
     return float(log.times[-1] - log.times[0] + np.median(steps[steps > 0]))
 
 
-def moments_of(log: DelayLog) -> tuple[float, float]:
+def compute_moments(log: DelayLog) -> tuple[float, float]:
     """Mean and standard deviation of the delays of a log [s]."""
     return float(np.nanmean(log.delays)), float(np.nanstd(log.delays))
 

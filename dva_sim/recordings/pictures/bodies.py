@@ -79,7 +79,7 @@ class DrawnBody:
         self._trail.set_segments(np.stack([places[:-1], places[1:]], axis=1)[moved])
         colours = [
             to_rgba(
-                style.colour_of(self.kind, p.mode),
+                style.choose_colour(self.kind, p.mode),
                 0.1 + 0.75 * math.exp(-(time - p.time) / style.TRAIL_S),
             )
             for p, here in zip(past[1:], moved, strict=True)
@@ -95,7 +95,7 @@ class DrawnBody:
         self._mark.set(
             marker=pointed.rotated(rad=here.heading),
             markersize=self.size() * style.LENGTHS[self.kind],
-            markerfacecolor=style.colour_of(self.kind, here.mode),
+            markerfacecolor=style.choose_colour(self.kind, here.mode),
         )
         ghost = self._ghost.show(time) if self._ghost else []
         return [self._trail, *ghost, self._mark]

@@ -58,7 +58,7 @@ GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # shares of the lower explosive limit
 HEAT_LEVELS = (1.0, 2.5, 10.0)  # levels of heat flux [kW/m2]; skin bears 2.5 for long
 
 
-def colour_of(kind: str, mode: str) -> str:
+def choose_colour(kind: str, mode: str) -> str:
     """Return the colour of an activity."""
     if kind == BYSTANDER and mode == "walking":
         return KINDS[kind]  # green is for guards
@@ -74,7 +74,7 @@ def legend(moments: Iterable[Moments]) -> list[Artist]:
         names = [(run, name) for run in runs for name in run.names(kind)]
         modes = {p.mode: None for run, name in names for p in run.tracks[name]}
         for mode in sorted(modes, key=_order):
-            handles.append(_dot(SHAPES[kind], colour_of(kind, mode), f"{kind}: {mode.lower()}"))
+            handles.append(_dot(SHAPES[kind], choose_colour(kind, mode), f"{kind}: {mode.lower()}"))
     looks = {title: hazard for run in runs for title, hazard in run.looks.items()}
     for title, hazard in sorted(looks.items()):
         handles.append(_dot(hazard.mark, hazard.colour, title))

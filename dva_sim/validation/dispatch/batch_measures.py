@@ -123,7 +123,7 @@ def _since(moments: Floats, times: Floats) -> Floats:
     return np.asarray(before * times - upto[before])
 
 
-def sample_of(recording: TimedRecording) -> Sample:
+def extract_sample(recording: TimedRecording) -> Sample:
     """Extract the sample from a recorded run."""
     scenario = recording.scenario
     columns = recording.columns

@@ -18,8 +18,8 @@ from dva_sim.validation.dispatch.batch_measures import (
     Batches,
     Floats,
     Sample,
+    extract_sample,
     occupied,
-    sample_of,
     sums,
 )
 from dva_sim.validation.dispatch.cases import Case
@@ -39,7 +39,7 @@ from dva_sim.validation.dispatch.estimation import (
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
 from dva_sim.validation.evidence import NORMAL_95, Evidence, share_rule
 from dva_sim.validation.evidence_page import ValidationResult
-from dva_sim.validation.frame import Key, Progress, Row, job_of, play_jobs
+from dva_sim.validation.frame import Key, Progress, Row, make_job, play_jobs
 
 Columns = dict[str, Floats]
 FAILED = "a run of case {!r} failed"
@@ -90,7 +90,7 @@ def play(job: StudyJob) -> Tables:
     """Play one run; return numerator and denominator of each measure, and controls, by batch."""
     scenario = cast(TimedScenario, job.scenario)
     levels = job.levels
-    sample = sample_of(simulate_timed(scenario, job.seed))
+    sample = extract_sample(simulate_timed(scenario, job.seed))
     batches = Batches(sample, int(str(levels["batches"])))
     columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}
     columns["broken"] = np.full(len(batches.lengths), float(sample.broken))
@@ -141,7 +141,7 @@ def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
     measures = json.dumps(list(case.exact))
     seeds = [derive_seed("validation", case.name, seed, trial) for trial in range(runs)]
     return [
-        job_of(case.name, own, case.scenario, batches=case.batches, measures=measures)
+        make_job(case.name, own, case.scenario, batches=case.batches, measures=measures)
         for own in seeds
     ]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dva_sim.core.dispatch import Assignment, Responder, Situation, Task, load_policy
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
-from dva_sim.validation.dispatch.batch_measures import Floats, Ints, many_servers, sample_of
+from dva_sim.validation.dispatch.batch_measures import Floats, Ints, extract_sample, many_servers
 
 POLICIES = (
     "nearest_idle",
@@ -149,7 +149,7 @@ def _first_come_first_served(seed: int) -> Deviations:
             "drain": True,
         }
         scenario["demand"][0]["look"] = {"law": "gamma", "mean_s": 1, "shape": 0.5}  # type: ignore[index]
-        sample = sample_of(_run(scenario, seed))
+        sample = extract_sample(_run(scenario, seed))
         waits = many_servers(sample.detected, sample.confirmed - sample.arrived, guards)
         off = abs(sample.assigned - sample.detected - waits).max()
         yield f"waits with {guards} guards against Kiefer and Wolfowitz [s]", _beyond(off)

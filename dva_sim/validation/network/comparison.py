@@ -11,7 +11,7 @@ from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.network.pattern_runs import RESULTS, Condition
 from dva_sim.simulation.models import Tables
-from dva_sim.validation.frame import Progress, job_of, play_jobs
+from dva_sim.validation.frame import Progress, make_job, play_jobs
 from dva_sim.validation.network.pooling import (
     Pooled,
     is_steady,
@@ -92,7 +92,7 @@ def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
     for first in range(0, order.runs, CHUNK):
         count = min(CHUNK, order.runs - first)
         request = order.condition.to_row(), order.depth, order.without, first, count
-        jobs.append(job_of(f"{text}, runs from {first}", seed, None, order=json.dumps(request)))
+        jobs.append(make_job(f"{text}, runs from {first}", seed, None, order=json.dumps(request)))
     return jobs
 
 
@@ -218,7 +218,7 @@ def compare(
         DvaSimError: a run failed.
     """
     played = [group for group in groups if not group.left_out]
-    orders = orders_of(played, setting)
+    orders = make_orders(played, setting)
     rows = play_all(
         [o for each in orders.values() for o in each], setting.seed, setting.workers, progress
     )
@@ -240,7 +240,7 @@ def compare(
     )
 
 
-def orders_of(
+def make_orders(
     groups: Sequence[ConditionGroup], setting: NetworkSetting
 ) -> dict[str, list[ModelRuns]]:
     """Model runs to make: full model, oversimplified controls, and ablations."""
@@ -262,10 +262,10 @@ def find_pooled(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
 def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
     """Return the number of runs in a comparison."""
     played = [group for group in groups if not group.left_out]
-    return sum(order.runs for own in orders_of(played, setting).values() for order in own)
+    return sum(order.runs for own in make_orders(played, setting).values() for order in own)
 
 
-def depths_of(comparison: NetworkComparison) -> dict[str, int]:
+def count_depths(comparison: NetworkComparison) -> dict[str, int]:
     """Return the number of conditions simulated at each depth."""
     return Counter(depth_for(group.condition) for group in comparison.groups)
 

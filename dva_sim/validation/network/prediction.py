@@ -24,8 +24,8 @@ from dva_sim.network.pattern_runs import (
     Condition,
     Measures,
     RunLog,
+    make_operator,
     measure_log,
-    operator_of,
 )
 from dva_sim.network.tcp import TcpOptions
 from dva_sim.network.virtual_network import FRAMING, VirtualNetwork
@@ -174,7 +174,7 @@ class PredictedRun:
             # The operator connects: who answers is there when its first packet has arrived.
             self._clock.call_at(condition.delay_ms / 1000.0, self._subscribe)
         self._note(NoteKind.OPENED, 0)
-        self._operator = operator_of(condition, self._network, form, self._note)
+        self._operator = make_operator(condition, self._network, form, self._note)
 
     def play(self) -> RunLog:
         """Run until the operator's program has ended; return the log."""

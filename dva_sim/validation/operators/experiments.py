@@ -26,7 +26,7 @@ from dva_sim.simulation.scenario.parts import OperatorConfig
 from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.movement_laws import fit_line
-from dva_sim.validation.frame import Progress, job_of, play_jobs
+from dva_sim.validation.frame import Progress, make_job, play_jobs
 from dva_sim.validation.operators.exact import MODEL_CHECKS
 from dva_sim.validation.operators.looking import PARTS
 from dva_sim.validation.operators.trials import (
@@ -605,7 +605,7 @@ def play_exact(
     Raises:
         RunsFailed: one of them could not be simulated.
     """
-    jobs = [job_of(check, setting.seed, None) for check in checks]
+    jobs = [make_job(check, setting.seed, None) for check in checks]
     rows = play_jobs(jobs, perform_exact, setting.workers, FAILED, progress)
     values = ((job.config, row) for job in jobs for row in rows[job.key])
     return {f"{check}/{row['line']}": certain(float(row["value"])) for check, row in values}
@@ -679,7 +679,7 @@ def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[S
         for cell, person in product(experiment.cells, range(setting.persons)):
             seed = derive_seed("operators", experiment.name, setting.seed, person)
             name = f"{experiment.name}/{cell}"
-            job = job_of(name, seed, None, person=person, population=setting.seed, traits=traits)
+            job = make_job(name, seed, None, person=person, population=setting.seed, traits=traits)
             jobs[cell].append(job)
         return jobs
     document = load_yaml(resources.find(experiment.scenario, FOLDER))
@@ -691,5 +691,5 @@ def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[S
             scenario = build(document, {**every, "operator.person": person})
             seed = derive_seed("operators", experiment.name, setting.seed, person)
             name = f"{experiment.name}/{cell}"
-            jobs[cell].append(job_of(name, seed, scenario, person=person))
+            jobs[cell].append(make_job(name, seed, scenario, person=person))
     return jobs

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dva_sim.worlds.camera.floors import HORIZON, OPEN_AIR, Floors
 from dva_sim.worlds.camera.room_colours import RoomGrid
-from dva_sim.worlds.camera.sprites import Figure, Sprite, sprite_of
+from dva_sim.worlds.camera.sprites import Figure, Sprite, choose_sprite
 from dva_sim.worlds.camera.surfaces import Floats, Hits, Surfaces
 from dva_sim.worlds.camera.textures import TEXELS, Uprights
 from dva_sim.worlds.camera.visibility import (
@@ -235,7 +235,7 @@ class Camera:
             thing = things[number]
             dx, dy = gaps[number]
             if isinstance(thing, Figure):
-                sprite: Sprite | None = sprite_of(thing, math.atan2(dy, dx))
+                sprite: Sprite | None = choose_sprite(thing, math.atan2(dy, dx))
             else:
                 sprite = thing.sprite(time, self._ceiling)
             if sprite is not None:

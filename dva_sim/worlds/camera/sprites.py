@@ -288,7 +288,7 @@ class Figure(NamedTuple):
     lying: bool = False
 
 
-def sprite_of(figure: Figure, bearing: float) -> Sprite:
+def choose_sprite(figure: Figure, bearing: float) -> Sprite:
     """Return the sprite of a figure as seen from the lens.
 
     Args:

@@ -258,7 +258,7 @@ def heat_in_jet(fire: Fire, distance: float, ceiling: float) -> float:
 
 @lru_cache(maxsize=4096)
 def _jet(kind: str, growth: str, peak: float, gap: float, ceiling: float) -> tuple[float, float]:
-    fire = _fire_of(growth, peak)
+    fire = _find_fire(growth, peak)
     reached, sounds = smoke_in_jet(fire, gap, ceiling)
     if kind == "heat":
         sounds = heat_in_jet(fire, gap, ceiling)
@@ -283,11 +283,11 @@ class Layer(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[March, Step]:
-    smoke = SmokeLayers(building.spaces, _fire_of(growth, peak).heat_release, room)
+    smoke = SmokeLayers(building.spaces, _find_fire(growth, peak).heat_release, room)
     return March(smoke.empty(), smoke.step, SMOKE_PACES), smoke.step_without_fire
 
 
-def _fire_of(growth: str, peak: float) -> Fire:
+def _find_fire(growth: str, peak: float) -> Fire:
     """Return the fire of a growth and peak, shared by all fires that grow alike."""
     return Fire.model_construct(position=(0.0, 0.0), start=0.0, growth=growth, peak=peak)
 

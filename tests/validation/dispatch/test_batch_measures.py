@@ -10,10 +10,10 @@ from dva_sim.simulation.timed import build, simulate_timed
 from dva_sim.validation.dispatch.batch_measures import (
     Batches,
     Sample,
+    extract_sample,
     many_servers,
     occupied,
     one_server,
-    sample_of,
     sums,
 )
 from dva_sim.validation.dispatch.estimation import controls, inputs
@@ -154,7 +154,7 @@ def a_sample(seed, **changes):
         }
         | changes
     )
-    return sample_of(simulate_timed(scenario, seed)), scenario
+    return extract_sample(simulate_timed(scenario, seed)), scenario
 
 
 def test_a_run_is_read_as_it_was_recorded():

@@ -12,7 +12,7 @@ from dva_sim.validation.network.real_side.measuring import (
     Progress,
     Row,
     describe_machine,
-    job_of,
+    make_job,
     measure_all,
 )
 
@@ -103,7 +103,7 @@ def test_a_campaign_stops_when_nothing_works(tmp_path, monkeypatch):
 
 
 def test_two_conditions_with_one_seed_do_not_share_their_random_numbers():
-    assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
+    assert make_job(SLOW, 1).seed != make_job(FAST, 1).seed != make_job(FAST, 2).seed
 
 
 def test_the_description_of_a_machine_names_nobody(played):

@@ -25,7 +25,7 @@ from dva_sim.validation.network.real_side.cell import (
     start_job,
     why_no_packets,
 )
-from dva_sim.validation.network.real_side.measuring import COLUMNS, job_of, measure
+from dva_sim.validation.network.real_side.measuring import COLUMNS, make_job, measure
 from dva_sim.validation.network.real_side.self_check import PROBES, Crossing, find_bursts, find_loss
 
 pytestmark = pytest.mark.system
@@ -58,7 +58,7 @@ class Run:
 def run() -> Iterator[Run]:
     need_link()
     with tempfile.TemporaryFile() as out:
-        run = Run(start_job(job_of(LONG, 1), out, out), out)
+        run = Run(start_job(make_job(LONG, 1), out, out), out)
         yield run
         run.process.kill()
         run.process.wait()
@@ -169,7 +169,7 @@ def test_a_killed_robot_ends_the_run_and_is_named(run):
 
 def test_a_run_that_takes_too_long_is_ended():
     need_link()
-    job = job_of(LONG, 1)
+    job = make_job(LONG, 1)
     short = EmulatedJob("commands", bound_s=0.1, arguments=job.arguments)
     with pytest.raises(EmulatorError, match=r"within 0\.1 s"):
         run_job(short)

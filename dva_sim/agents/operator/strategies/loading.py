@@ -15,7 +15,7 @@ from dva_sim.agents.operator.strategies.pursuit import Pursuit, TwoPoint
 from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import Plugins, word_of
+from dva_sim.kernel.plugins import Plugins, name_plugin
 
 Driver = Strategy | Oracle
 
@@ -76,7 +76,7 @@ def load_strategy(
     """
     factory = PLUGINS.find(name, base)
     own_options = dict(options or {})
-    word = word_of(name)
+    word = name_plugin(name)
 
     def make(person: Person, reach: Reach) -> Driver:
         used: dict[str, Any] = {}

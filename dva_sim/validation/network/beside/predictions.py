@@ -32,7 +32,7 @@ from dva_sim.network.middleware import load_transport
 from dva_sim.network.transports.message_parts import PACKET
 from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.models import Tables
-from dva_sim.validation.frame import Progress, Row, job_of, play_jobs
+from dva_sim.validation.frame import Progress, Row, make_job, play_jobs
 from dva_sim.validation.network.beside.carriers import why_not
 from dva_sim.validation.network.beside.virtual_run import ProgramTimes, VirtualRun
 from dva_sim.validation.network.reference import FOLDER
@@ -134,7 +134,7 @@ def predict_all(
     """
     played = [cell for cell in cells if not cell.why_not]
     jobs = {
-        (cell.config, seed): job_of(cell.config, seed, cell.scenario, plays=plays)
+        (cell.config, seed): make_job(cell.config, seed, cell.scenario, plays=plays)
         for cell in played
         for seed in cell.seeds
     }

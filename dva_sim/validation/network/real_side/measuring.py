@@ -114,7 +114,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     Raises:
         EmulatorError: the run failed, or this link cannot do what the condition asks.
     """
-    job = job_of(condition, seed, link)
+    job = make_job(condition, seed, link)
     refuse_for_proxy(job)
     outcome = run_job(job)
     log = RunLog.of([*outcome.operator, *outcome.robot])
@@ -129,7 +129,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     return {name: row[name] for name in COLUMNS}
 
 
-def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
+def make_job(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
     """Make the job for the process of one run."""
     played_s = condition.warm_s + condition.dur_s
     return EmulatedJob(

@@ -19,7 +19,7 @@ from zmq.utils.monitor import recv_monitor_message
 
 from dva_sim.network.messaging import OnReply
 from dva_sim.network.middleware.zeromq import PlainWire, plain_socket
-from dva_sim.network.pattern_runs import COMMAND_BYTES, REPLY_BYTES, Condition, operator_of
+from dva_sim.network.pattern_runs import COMMAND_BYTES, REPLY_BYTES, Condition, make_operator
 from dva_sim.network.realtime import ProgramClock, Socket
 from dva_sim.network.workload import FileNotes, NoteKind, NumberedBytes, RobotWorkload
 
@@ -71,7 +71,7 @@ def run_operator(condition: Condition, channel: socket.socket, notes: FileNotes)
     with zmq.Context() as context:
         sockets = OperatorSockets(context, condition, endpoint, notes)
         clock = sockets.clock
-        operator = operator_of(condition, sockets, FORM, notes.add)
+        operator = make_operator(condition, sockets, FORM, notes.add)
         operator.on_end = clock.stop
 
         def begin() -> None:
