@@ -111,16 +111,15 @@ def test_the_motors_of_a_driven_robot_follow_the_set_point_of_its_driver():
 def test_a_robot_that_cannot_be_driven_publishes_nothing_until_it_can_and_says_why(dva, robot):
     heard = list[bytes]()
     dva.network.subscribe(dva.device.id_tag, ROBOT, STATUS, heard.append)
-    robot.withdraw("its drive does not answer")
+    why = "its drive does not answer"
+    robot.withdraw(why)
     dva.run_for(1.0)
     heard.clear()  # that it is idle
     answers = Answers(robot)
     dva.sessions[ROBOT] = m.PermissionGrant(OPERATOR, "teleoperation", 1)
     answers.ask(m.StartTeleOp(), OPERATOR, session=1)
     dva.run_for(5.0)
-    assert [(reply.code, reply.text) for reply in answers] == [
-        (m.BUSY, "its drive does not answer")
-    ]
+    assert [(reply.code, reply.text) for reply in answers] == [(m.BUSY, why)]
     assert heard == []
     robot.return_to_service()
     dva.run_for(3.0)

@@ -509,7 +509,7 @@ def test_a_proposal_tells_that_no_way_leads_to_a_place(monkeypatch):
     office.fire(12)
     content = decide(office, m.GetProposal(1), 1.0)[0].content
     assert isinstance(content, m.Proposal)
-    assert content.reason == "no way leads there: nobody can go"
+    assert (content.device, unnamed(content.reason, "no way")) == (None, [])
 
 
 def test_a_proposal_tells_why_nobody_can_go():

@@ -98,7 +98,7 @@ class Served:
     # --- the simulation's side -----------------------------------------------------------
 
     def say(self, *lines: Line) -> None:
-        """Say something as the simulation."""
+        """Send lines as the simulation."""
         for line in lines:
             self.end.sendall(json.dumps(line).encode() + b"\n")
 

@@ -126,7 +126,7 @@ def pipelined(operator: ScriptedOperator, _: Witness) -> Script:
 
 
 def published(operator: ScriptedOperator, witness: Witness) -> Script:
-    """The drill with commands that nobody answers: the next goes when the robot has the last.
+    """Perform the drill with published commands: each waits until the robot has the last one.
 
     A robot that is not driven hears no commands, so the one after the emergency goes nowhere.
     """

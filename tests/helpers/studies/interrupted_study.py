@@ -33,7 +33,7 @@ def run(out: Path, study: Any) -> None:
 
 
 def run_after(out: Path, study: Any) -> None:
-    """Run it as soon as no other process writes into the folder; none that was killed does."""
+    """Run a study once no other process writes into the folder; killed ones do not."""
     while True:
         try:
             run(out, study)
