@@ -124,10 +124,10 @@ class AgentDevice:
 
     def call(self, label: str) -> None:
         """Change the label, which must be distinguishable from all others here."""
-        others = [
+        other_labels = [
             label_there for id_tag, label_there in self.labels.items() if id_tag != self.id_tag
         ]
-        self.label = self.labels[self.id_tag] = distinct(label, self.id_tag, others)
+        self.label = self.labels[self.id_tag] = distinct(label, self.id_tag, other_labels)
 
     def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
         """Register with the DVA until it has answered, then renew that now and then.

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import without_unit
 
+# Units whose measures have a minimum of 0 unless stated otherwise.
 _NEVER_NEGATIVE = frozenset({"s", "m", "m/s", "Hz", "bit/s", "B", "N s"})
 
 

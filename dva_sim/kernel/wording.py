@@ -26,7 +26,7 @@ def number(value: float) -> str:
 
 
 def as_number(text: str) -> float:
-    """Parse text by `number`; nan for its dash."""
+    """Parse the output of `number`; its dash is nan."""
     return float(text.replace("\N{MINUS SIGN}", "-").replace("–", "nan"))
 
 

@@ -80,7 +80,7 @@ class FoxgloveViewer:
             self._news.set()
 
     def show(self, channel: ViewedChannel, time: int, content: bytes) -> None:
-        """Send a message of a channel [ns], if the viewer has subscribed to it."""
+        """Send a channel's message with its time [ns], if the viewer has subscribed to it."""
         number = self._subscriptions.get(channel)
         if number is not None:
             self._put(struct.pack("<BIQ", MESSAGE, number, time) + content)

@@ -309,9 +309,9 @@ def _step(
 ) -> LoadFigures:
     shares = _shares(options, devices, address)
     before = dva.used_s
-    every = make_shares(shares)
-    looked = dva.look(before, shares[0].settle + options.duration)
-    return figures_of(options, devices, every, looked)
+    counts = make_shares(shares)
+    usage = dva.look(before, shares[0].settle + options.duration)
+    return figures_of(options, devices, counts, usage)
 
 
 def make_here(shares: list[LoadShare]) -> list[dict[str, Any]]:

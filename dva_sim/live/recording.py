@@ -340,7 +340,7 @@ def _emptied(path: Path) -> IO[bytes]:
         with ExitStack() as stack:
             file = stack.enter_context(path.open("a+b", buffering=0))
             _lock(file, path)
-            file.write(b"?")
+            file.write(b"?")  # a full disk is found before the old content is lost
             file.truncate(0)
             stack.pop_all()
             return file

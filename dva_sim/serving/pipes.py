@@ -96,7 +96,7 @@ class PipeEnd:
         return True
 
     def read(self) -> bytes | None:
-        """Return the bytes received since then; None if there are none, empty at the pipe's end."""
+        """Return newly received bytes; None if there are none, empty at the end of the pipe."""
         try:
             data = os.read(self._end, READ_BYTES)
         except BlockingIOError:

@@ -45,7 +45,7 @@ def effect_size(
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
-        b: The other `(n,)`, row by row the same person and trial.
+        b: Values under the other `(n,)`, for the same person and trial in each row.
         person: Person of each run `(n,)`.
         resamples: Number of bootstrap resamples.
 

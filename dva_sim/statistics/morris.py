@@ -62,9 +62,15 @@ def elementary_effects(walks: Floats, outcome: NDArray[np.float64]) -> list[Elem
     slopes = signs * np.diff(outcome, axis=1) / STEP
     effects = np.empty_like(slopes)
     np.put_along_axis(effects, axis_of_step, slopes, axis=1)
-    about = band(effects)
+    effect_band = band(effects)
     counts = np.isfinite(effects).sum(axis=0)
-    ends = zip(about.mean, about.pointwise_low, about.pointwise_high, counts, strict=True)
+    ends = zip(
+        effect_band.mean,
+        effect_band.pointwise_low,
+        effect_band.pointwise_high,
+        counts,
+        strict=True,
+    )
     means = [Interval(float(m), float(low), float(high), int(n)) for m, low, high, n in ends]
     sizes = np.nanmean(abs(effects), axis=0)
     spreads = np.nanstd(effects, axis=0, ddof=1)

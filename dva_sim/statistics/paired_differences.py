@@ -63,9 +63,9 @@ def one_sided_test(
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
-        b: The other `(n,)`, row by row the same person and trial.
+        b: Values under the other `(n,)`, for the same person and trial in each row.
         person: Person of each run `(n,)`.
-        bound: In the measure's unit.
+        bound: Bound of the difference, in the measure's unit.
         side: Side of the bound on which the difference is claimed to lie.
 
     Returns:
@@ -83,7 +83,7 @@ def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) ->
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
-        b: The other `(n,)`, row by row the same person and trial.
+        b: Values under the other `(n,)`, for the same person and trial in each row.
         person: Person of each run `(n,)`.
         margin: Largest irrelevant difference in either direction, in the measure's unit.
 
@@ -108,7 +108,7 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
 
     Args:
         a: Values under one treatment `(n,)`, nan where missing.
-        b: The other `(n,)`, row by row the same person and trial.
+        b: Values under the other `(n,)`, for the same person and trial in each row.
         person: Person of each run `(n,)`.
 
     Returns:

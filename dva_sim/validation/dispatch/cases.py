@@ -204,7 +204,7 @@ class CaseConfig(Config):
     )
     @classmethod
     def _same_names(cls, value: Any) -> Any:
-        """Return a list compares each measure with the exact value of the same name."""
+        """Convert a list of names to pairs of measures and exact values of the same name."""
         return {name: name for name in value} if isinstance(value, list | tuple) else value
 
 

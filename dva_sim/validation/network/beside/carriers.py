@@ -334,8 +334,8 @@ class MqttCarrier(Carrier):
         down = between.down
         is_far = options.broker == "far"
         self._qos = options.qos
-        here = out, back
-        operators, robots = ((up, down), here) if is_far else (here, (down, up))
+        local_links = out, back
+        operators, robots = ((up, down), local_links) if is_far else (local_links, (down, up))
         self._operator = MqttClient(
             self.clock, operators, options, between.on_picture, self._to_robot
         )
