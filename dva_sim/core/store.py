@@ -29,6 +29,14 @@ from dva_sim.core.emergencies import RobotStop
 from dva_sim.core.events import KEPT_CLOSED, Choice, Event, Handling, State
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Grant
+from dva_sim.core.stored_rows import (
+    DeviceRow,
+    EventRow,
+    GrantRow,
+    RevocationRow,
+    StopRow,
+    read_row,
+)
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 
@@ -245,7 +253,7 @@ class Store:
         """
         try:
             has_memory = self._recall(dva, now)
-        except (sqlite3.Error, ValueError, KeyError, TypeError) as error:
+        except (sqlite3.Error, ValueError, KeyError, TypeError, OverflowError) as error:
             raise self._useless(error) from None
         dva.check_access(now)
         return has_memory
@@ -258,13 +266,13 @@ class Store:
             if is_silent:
                 silent.add(id_tag)
             else:
-                dva.registry.add(_entry(json.loads(data), now))
+                dva.registry.add(_entry(read_row(DeviceRow, data), now))
         has_memory = bool(dva.registry.entries)
         for state, count in self._counts().items():
             dva.events.counts[state] += count
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
             has_memory = True
-            row = json.loads(data)
+            row = read_row(EventRow, data)
             event = _event(row, self.past)
             dva.events.restore(event)
             for name in row["engaged"]:
@@ -286,7 +294,7 @@ class Store:
             return self._about("time") / MICROSECONDS
         times = [0.0]
         for (data,) in self._file.execute("SELECT data FROM events"):
-            row = json.loads(data)
+            row = read_row(EventRow, data)
             times += [row["waiting_since"], *row["times"].values()]
         return max(times)
 
@@ -302,11 +310,13 @@ class Store:
             columns = f"{_KEYS[table]}, data"
             sessions |= self._file.execute(f"SELECT {columns} FROM {table} ORDER BY rowid")
         for data in self._sessions["grants"].values():
-            permissions.restore(_grant(json.loads(data)))
+            permissions.restore(_grant(read_row(GrantRow, data)))
         for data in self._sessions["untold"].values():
-            dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
+            dva.sessions.tell_robot(PermissionRevocation(*read_row(RevocationRow, data)))
         for robot, data in self._sessions["stops"].items():
-            stopped_by, tick = json.loads(data)
+            stopped_by, tick = read_row(StopRow, data)
+            if robot not in dva.registry.entries:
+                raise ValueError("a robot is stopped that is not registered")
             dva.emergencies.restore(robot, RobotStop(stopped_by, tick, now, now))
         self._session_changes, self._held = _session_changes(dva), _held(dva)
         self._lasting = dva.with_something_open()
@@ -319,7 +329,10 @@ class Store:
 
     def _about(self, name: str) -> int:
         row = self._file.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
-        return int(row[0]) if row else 0
+        value = int(row[0]) if row else 0
+        if abs(value) >= 2**62:
+            raise ValueError(f"{name} is {value}")
+        return value
 
 
 _KEYS = {"grants": "session", "untold": "session", "stops": "robot"}

@@ -453,6 +453,14 @@ def test_a_file_that_another_holds_cannot_be_opened(file, monkeypatch):
         "UPDATE devices SET data = '[]'",
         "UPDATE grants SET data = '{}'",
         "DROP TABLE grants",
+        # Sound as JSON, and of no use later.
+        "UPDATE events SET data = json_set(data, '$.severity', '0.5')",
+        "UPDATE events SET data = json_set(data, '$.times.detected', 1e300)",
+        "UPDATE devices SET data = json_set(data, '$.device[1]', 7)",
+        "UPDATE devices SET data = json_set(data, '$.registrations', json('[[\"1\", \"2\"]]'))",
+        "INSERT INTO stops VALUES ('02:00:00:09:09:09', '[null, 3]')",
+        "UPDATE about SET value = 9e18 WHERE name = 'sessions'",
+        f"UPDATE grants SET data = '{'[' * 10_000}'",
     ],
 )
 def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(file, damage):
