@@ -91,7 +91,7 @@ def test_a_recording_has_the_same_history(desk):
     run = desk.world.run
     playback = replace(run.recording(), events=[run.dva.core.events.get(1)])
     run_so_far = RecordedRun(Opened(playback, {}, None, 0.0), "desk")
-    recorded = run_so_far.histories(run.clock.now)
+    recorded = run_so_far.system.room(run.clock.now).histories
     steps = [(step.what, step.who, step.reason) for step in recorded[1].steps]
     assert len(steps) == 5
     live = details(desk, event=1)["history"]
