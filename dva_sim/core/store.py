@@ -30,11 +30,11 @@ from dva_sim.core.events import KEPT_CLOSED, Choice, Event, Handling, State
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Grant
 from dva_sim.core.stored_rows import (
-    DeviceRow,
-    EventRow,
     GrantRow,
     RevocationRow,
     StopRow,
+    StoredDevice,
+    StoredEvent,
     read_row,
 )
 from dva_sim.kernel.errors import ConfigError
@@ -266,13 +266,13 @@ class Store:
             if is_silent:
                 silent.add(id_tag)
             else:
-                dva.registry.add(_entry(read_row(DeviceRow, data), now))
+                dva.registry.add(_entry(read_row(StoredDevice, data), now))
         has_memory = bool(dva.registry.entries)
         for state, count in self._counts().items():
             dva.events.counts[state] += count
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
             has_memory = True
-            row = read_row(EventRow, data)
+            row = read_row(StoredEvent, data)
             event = _event(row, self.past)
             dva.events.restore(event)
             for name in row["engaged"]:
@@ -294,7 +294,7 @@ class Store:
             return self._about("time") / MICROSECONDS
         times = [0.0]
         for (data,) in self._file.execute("SELECT data FROM events"):
-            row = read_row(EventRow, data)
+            row = read_row(StoredEvent, data)
             times += [row["waiting_since"], *row["times"].values()]
         return max(times)
 

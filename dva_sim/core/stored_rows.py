@@ -28,7 +28,7 @@ RevocationRow = tuple[Name, Name, Whole]
 StopRow = tuple[Name | None, Whole]
 
 
-class HandlingRow(TypedDict):
+class StoredHandling(TypedDict):
     """Decisions on an event; see `Handling`."""
 
     decisions: Whole
@@ -40,7 +40,7 @@ class HandlingRow(TypedDict):
     advised: Name
 
 
-class EventRow(TypedDict):
+class StoredEvent(TypedDict):
     """An event; see `Event`, whose times are those of the memory here [s]."""
 
     number: Whole
@@ -63,10 +63,10 @@ class EventRow(TypedDict):
     sent: list[Name]
     times: dict[Name, Time]
     engaged: list[Name]
-    handling: NotRequired[HandlingRow | None]
+    handling: NotRequired[StoredHandling | None]
 
 
-class DeviceRow(TypedDict):
+class StoredDevice(TypedDict):
     """A registered device, with the numbers and times of its last registrations."""
 
     device: tuple[Name, Name, Name, Name]
