@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 MAX_TIME_S: Final = 1e12  # longest time that makes sense, and keeps microseconds
 Name = Annotated[str, Field(max_length=200)]
 Words = Annotated[str, Field(max_length=10_000)]
-Whole = Annotated[int, Field(ge=0, lt=2**53)]
+Whole = Annotated[int, Field(ge=0, lt=2**63)]  # sessions have 63 bits
 Time = Annotated[float, Field(ge=-MAX_TIME_S, le=MAX_TIME_S)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
