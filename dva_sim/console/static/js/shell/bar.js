@@ -1,4 +1,4 @@
-/** Top bar: time, link, age of the data, open events, the person's role, emergency stop. */
+/** Top bar: time, link, age of the data, alarms, the person's role, emergency stop. */
 import { html } from '../../vendor/preact.js';
 import {
   clock, isAttached, isBeside, isModelled, isPast, link, maySteer, replay, scene, you,
@@ -80,7 +80,7 @@ function Age() {
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms reported" href="#/events" title="Open events, by severity"><span class="word soft">events</span>
+  return html`<a class="item alarms reported" href="#/events" title="Open events, by severity"><span class="word soft">alarms</span>
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'} title=${`${count} open events of severity ${rank}`}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
