@@ -98,7 +98,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
         assert checked.ends() == 0, checked.output + checked.complained
     in_order(ROWS, [row.action for row in read_rows(audit)])
     opened = read_recording(record)
-    (history,) = RecordedRun(opened, record.name).histories(opened.lasted).values()
+    (history,) = RecordedRun(opened, record.name).system.room(opened.lasted).histories.values()
     in_order(STEPS, [step.what for step in history.steps])
     assert len({*history.steps}) == len(history.steps)
     sent = list(opened.playback.recorder.traffic or ())
