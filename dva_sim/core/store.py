@@ -253,7 +253,7 @@ class Store:
         """
         try:
             has_memory = self._recall(dva, now)
-        except (sqlite3.Error, ValueError, KeyError, TypeError, OverflowError) as error:
+        except (sqlite3.Error, ValueError, OverflowError) as error:
             raise self._useless(error) from None
         dva.check_access(now)
         return has_memory
@@ -388,7 +388,12 @@ def _of_handling(handling: Handling, past: float) -> dict[str, Any] | None:
         "acknowledged": _of_choice(handling.acknowledged, past),
         "note": handling.note,
         "taken_off": sorted(handling.taken_off),
-        "expected": {d: (sent + past, eta) for d, (sent, eta) in handling.expected.items()},
+        # SQLite has no infinity: where there is no way, no time is expected.
+        "expected": {
+            d: (sent + past, eta)
+            for d, (sent, eta) in handling.expected.items()
+            if math.isfinite(eta)
+        },
         "advised": handling.advised,
     }
 

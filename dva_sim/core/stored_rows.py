@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 MAX_TIME_S: Final = 1e12  # longest time that makes sense, and keeps microseconds
 Name = Annotated[str, Field(max_length=200)]
 Words = Annotated[str, Field(max_length=10_000)]
-Whole = Annotated[int, Field(ge=0, lt=2**63)]  # sessions have 63 bits
+Whole = Annotated[int, Field(ge=0, lt=2**64)]  # as sessions and numbers of messages
 Time = Annotated[float, Field(ge=-MAX_TIME_S, le=MAX_TIME_S)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -43,7 +43,7 @@ class StoredHandling(TypedDict):
 class StoredEvent(TypedDict):
     """An event; see `Event`, whose times are those of the memory here [s]."""
 
-    number: Whole
+    number: Annotated[int, Field(ge=0, lt=2**63)]  # as SQLite has them
     kind: Name
     position: tuple[Degrees, Degrees]
     severity: Annotated[float, Field(ge=0.0, le=100.0)]
@@ -71,7 +71,7 @@ class StoredDevice(TypedDict):
 
     device: tuple[Name, Name, Name, Name]
     registrations: list[tuple[Whole, Name]]
-    silent: bool
+    silent: NotRequired[bool]  # not in older files
 
 
 def read_row(kind: Any, data: str) -> Any:

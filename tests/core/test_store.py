@@ -1,5 +1,6 @@
 """State that survives a killed DVA, and files that are full, locked or invalid."""
 
+import math
 import os
 import shutil
 import signal
@@ -30,6 +31,7 @@ from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import A_DAY
 
 RULES = Rules(containment=True, escalate_after=60.0)
 
@@ -473,6 +475,30 @@ def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(file, dama
         memory.recall(office.new_core(), 0.0)
     assert "\n" not in str(refused.value)
     memory.close()
+
+
+def test_the_largest_that_a_dva_may_hold_is_recalled(file):
+    office, memory = Office(), Store(file)
+    office.say(GUARD, m.Registration("x" * 64, "Guard", ADDRESS))
+    sessions = office.core.sessions.permissions
+    sessions.count = 2**32 - 2 * A_DAY
+    office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
+    office.fire(12)
+    (event,) = office.core.events.open.values()
+    event.handling.note = "x" * 256
+    event.handling.expected[GUARD] = 1.0, math.inf  # there is no way
+    office.core.events.touch(event)
+    keep(office, memory)
+    by_hand(file, "UPDATE devices SET data = json_remove(data, '$.silent')")  # as older versions
+    memory.close()
+    core = next_life(office, file, 0.0)
+    assert core.registry.entries[GUARD].device.label == "x" * 64
+    assert [grant.session for grant in core.sessions.permissions.all()] == [
+        grant.session for grant in sessions.all()
+    ]
+    assert max(grant.session for grant in sessions.all()) > 2**63
+    (recalled,) = core.events.open.values()
+    assert recalled.handling.arrival_in(GUARD, 0.0) is None
 
 
 def test_a_label_of_any_letters_is_kept_as_it_is(file):

@@ -12,10 +12,10 @@ from dva_sim.console.wire.rows import DoingShown, RobotRow
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.event_moments import News, news_of
+from dva_sim.recordings.pictures.moments import GONE
 from dva_sim.simulation.full import Playback
 
 ROUNDED = 0.0005  # rounding error of times on pages, in milliseconds [s]
-GONE = 1.0  # whoever was not seen for so long has left the site [s]
 
 
 class RecordedBench:

@@ -103,7 +103,7 @@ class MutualHelp:
         if self.copy_of(asker, order.event_id) is not None:
             return DvaAnswer()
         if self._owes_word(asker, order.event_id):
-            return DvaAnswer(m.BUSY, "what became of the order before is on its way")
+            return DvaAnswer(m.BUSY, "the end of an earlier order is still being reported")
         if not self.dispatcher.situations.idle(now):
             return DvaAnswer(m.BUSY, "nobody is free here")
         orders = self.dispatcher.orders
@@ -116,9 +116,9 @@ class MutualHelp:
         return DvaAnswer(sends=self.dispatcher.decide(now))
 
     def _owes_word(self, asker: str, number: int) -> bool:
-        """Return True if what became of an earlier order of the same event is not known yet.
+        """Return True while the asker has not heard how an earlier order for an event ended.
 
-        Word of it would end a new order, which nobody would then call off.
+        That news would end a new order there, and the people sent would not be called off.
         """
         untold = self.on_the_way.union(self.unheard.get(asker, ()))
         return any(s.to == asker and event_told(s.body) == number for s in untold)

@@ -116,7 +116,7 @@ class RegionalDva(Dva):
         self.help.on_the_way.discard(send)
         if isinstance(send.body, m.Order) and send.to in self.division.peers:
             number = send.body.event_id
-            if self.orders.engaged.find(send.to, number) is None:  # it is over meanwhile
+            if self.orders.engaged.find(send.to, number) is None:  # it has ended meanwhile
                 return self._with_revocations([Send(send.to, m.OrderProgress(number, "done"))])
         return super().delivered(send, now, content)
 

@@ -56,8 +56,8 @@ class Deputy:
         if claim is None:
             return DvaAnswer(m.NOT_SUPPORTED, f"no region {body.region!r} is known here")
         if claim == Claim(body.epoch, self.division.own):  # it returns what this DVA has forgotten
-            known = self.copies.setdefault(body.region, {})
-            known.setdefault(body.event.event_id, Copy(body.event, now))  # it may return it twice
+            copies = self.copies.setdefault(body.region, {})
+            copies.setdefault(body.event.event_id, Copy(body.event, now))  # it may come twice
             self.taken_over.setdefault(body.region, now)
             return DvaAnswer()
         self.division.learn(body.region, Claim(body.epoch, peer))

@@ -331,7 +331,7 @@ class EventLedger:
             self._let_no_time_pass(passed)
             self._down_at = self._down_at if self._was_down else now
             self._was_down = True
-            if len(self._books) > 1:  # S13 judges what it has taken just before, and was copied
+            if len(self._books) > 1:  # S13 judges those of its last reports that were copied
                 self._taken.clear()
                 self._unjudged.clear()
             return
@@ -459,7 +459,7 @@ class EventLedger:
         word.ordered.update((device, goes or device) for device, goes in sent.items() if device)
         word.went.update(word.ordered.items())
         for book in self._books:  # orders that were accepted at the DVA before
-            before = book._word(event.number)  # of an end there the copy may know nothing
+            before = book._word(event.number)  # the deputy's copy may be older than its end
             word.taken |= (before.taken | before.ended) & word.ordered.keys()
         conclusions = FOUND.intersection((*event.times, event.state.value))
         return Seen(conclusions, _in_hand(event), now, now, now, times=dict(event.times))

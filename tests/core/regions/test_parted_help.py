@@ -8,13 +8,19 @@ from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 
-def lent_and_parted():
-    """A street whose western DVA has sent somebody of its own, too, when the eastern was silent."""
+def lent():
+    """A street whose eastern guard is sent to an event in the west."""
     street = Street()
     street.register(WEST, DETECTOR, "Sensor")
     street.guard(EAST, GUARD, 90)
     street.fire(WEST, DETECTOR, 10)
     street.tick(6, GUARD, DETECTOR)
+    return street
+
+
+def lent_and_parted():
+    """A street whose western DVA has sent somebody of its own, too, when the eastern was silent."""
+    street = lent()
     assert street.cores[WEST].events.open[1].responder == EAST
     street.parted = True
     street.guard(WEST, OTHER_GUARD, 20)
@@ -40,11 +46,7 @@ def test_nobody_is_called_back_while_they_do_not_hear_each_other():
 
 
 def test_what_a_helper_found_behind_a_partition_is_told_before_it_takes_a_new_order():
-    street = Street()
-    street.register(WEST, DETECTOR, "Sensor")
-    street.guard(EAST, GUARD, 90)
-    street.fire(WEST, DETECTOR, 10)
-    street.tick(6, GUARD, DETECTOR)
+    street = lent()
     street.parted = True
     street.guard(EAST, GUARD, 10)
     finding = m.EventReport(1_000_001, "fire", east(10), 0.5, 0.9, "confirmed")
