@@ -6,13 +6,13 @@ decimal comma. Blank lines are ignored, and every mistake has its line and colum
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dva_sim.kernel.csv_cells import numbered_rows
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.yaml_files import read_text
@@ -119,16 +119,8 @@ def read_table(path: str) -> CsvTable:
         raise ConfigError(problem, file, error.line, error.column) from None
     head = next((line for line in text.split("\n") if line.strip()), "")
     delimiter = max(",;\t", key=head.count)
-    reader = csv.reader(text.split("\n"), delimiter=delimiter)
-    rows = list[tuple[int, list[str]]]()
-    line = 1
-    try:
-        for row in reader:
-            if any(cell.strip() for cell in row):
-                rows.append((line, row))
-            line = reader.line_num + 1
-    except csv.Error as error:
-        raise ConfigError(f"is not a table: {error}", file, line, 1) from None
+    table = numbered_rows(text.split("\n"), file, delimiter)
+    rows = [(line, row) for line, row in table if any(cell.strip() for cell in row)]
     if not rows:
         raise ConfigError("is empty: it needs a header with the names of its columns", file, 1, 1)
     line, names = rows[0]

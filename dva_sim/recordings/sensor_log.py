@@ -6,7 +6,6 @@ what is asked for, or by gravity. A log without gravity, or of gravity alone, is
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 import re
@@ -16,6 +15,7 @@ from statistics import fmean, median, pstdev
 from typing import Final, Literal, NamedTuple
 
 from dva_sim.agents.tilt.accelerometer import GRAVITY
+from dva_sim.kernel.csv_cells import numbered_rows
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import listed
 from dva_sim.kernel.yaml_files import read_text
@@ -68,7 +68,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> SensorLog:
     """
     lines = read_text(path).split("\n")
     delimiter = max(";\t,", key=lambda sign: lines[0].count(sign))
-    rows = [(n, row) for n, row in enumerate(csv.reader(lines, delimiter=delimiter), 1) if row]
+    rows = [(number, row) for number, row in numbered_rows(lines, path, delimiter) if row]
     if not rows:
         raise ConfigError(f"is empty; a log of an accelerometer {NEEDED}", path)
     columns = _columns_of(rows[0][1], path)

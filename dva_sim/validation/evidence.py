@@ -201,5 +201,5 @@ def read_evidence(path: Path) -> list[Evidence]:
                 {key: text for key, text in row.items() if text} for row in csv.DictReader(file)
             ]
         return TypeAdapter(list[Evidence]).validate_python(rows)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise ConfigError(f"cannot be read as a table of evidence: {error}", path) from None

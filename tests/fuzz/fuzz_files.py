@@ -75,13 +75,14 @@ def mutants(table: Sequence[Reader], folder: Path, count: int, seed: int) -> Ite
 def use(mutant: Mutant, folder: Path) -> str:
     """Read a mutant, and use it if it is valid; what is wrong with how that went, or nothing."""
     from dva_sim.cli.program import call
+    from dva_sim.kernel.errors import ConfigError, error_line
 
     reader = mutant.reader
     if reader.read is not None:
         try:
             said = str(reader.read(mutant.data) or "")
         except reader.refuses as error:
-            said = str(error)
+            said = error_line(error) if isinstance(error, ConfigError) else str(error)
             if len(said) > MOST_LETTERS or "\n" in said:
                 return f"refuses with {len(said)} characters: {said[:200]!r}"
         return _active(said)

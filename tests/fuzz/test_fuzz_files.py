@@ -87,7 +87,7 @@ def test_the_search_ends_a_reader_that_sleeps():
 
 # Deep inside of what a door leads to, each with a value at which it fails.
 PLANTED = {
-    "web": (dispatcher, "_checked", "'d0'"),
+    "web": (dispatcher, "_checked", "'id': 'd"),
     "rosbridge": (RosPeer, "_subscribe", "/clock"),
     "bridge": (RosbridgeClient, "_refuse", ""),
     "message heard": (Dva, "_answer", "02:00:00"),

@@ -73,6 +73,7 @@ LOGS = mistakes(
     (still() + "nan,0,0,9.8\n", "log.csv:102"),
     (still(unit=1e15), "log.csv time (ms)"),
     (still() + "0.99,1e300,0,9.8\n", "log.csv:102 sensor"),
+    (still() + "0," + "9" * 140_000, "log.csv:102 table"),
 )
 ONE_MOMENT = "0,0,0,0,0,9.8,0\n" * 30
 MOTION = mistakes(

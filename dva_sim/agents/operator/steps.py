@@ -181,10 +181,15 @@ def give_back_unanswered(
 def ask_emergency(device: AgentDevice, robot: str, session: int, on_result: OnResult) -> None:
     """Send a robot an emergency, which it obeys from any sender."""
     label = device.label_of(robot)
-    device.ask(
-        robot,
-        m.Emergency(),
-        lambda reply: on_result(reply.code == m.OK, f"{label} has stopped"),
-        lambda: on_result(False, f"{label} does not answer"),
-        session,
-    )
+
+    def answered(reply: m.Reply) -> None:
+        if reply.code == m.OK:
+            on_result(True, f"{label} has stopped")
+        else:
+            why = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+            on_result(False, f"{label} has not stopped: {why}")
+
+    def unanswered() -> None:
+        on_result(False, f"{label} does not answer")
+
+    device.ask(robot, m.Emergency(), answered, unanswered, session)

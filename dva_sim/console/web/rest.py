@@ -19,6 +19,7 @@ from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.limits import MAX_BYTES
 from dva_sim.console.wire.roles import Role
+from dva_sim.kernel.labels import visible
 from dva_sim.worlds.geo import GeoFrame
 
 NOT_KEPT = {"Cache-Control": "no-store"}
@@ -265,4 +266,4 @@ class TooStrange(Exception):
 
 def problem(status: int, text: str) -> Response:
     """Return an answer that says in one line why nothing was done."""
-    return JSONResponse({"ok": False, "text": text}, status, headers=NOT_KEPT)
+    return JSONResponse({"ok": False, "text": visible(text)}, status, headers=NOT_KEPT)

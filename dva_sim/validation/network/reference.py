@@ -89,7 +89,7 @@ def read_runs(name: str, source: SourceConfig) -> list[SocketRun]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"cannot be read: {error}", str(path)) from None
     if not rows:
         raise ConfigError("holds no runs, so there is nothing to compare with", str(path))

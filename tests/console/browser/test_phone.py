@@ -326,6 +326,11 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, running, visits):
     other.leave()
 
 
+def is_of_its_own(response):
+    is_stop = response.url.endswith("/api/emergency")
+    return is_stop and response.request.post_data_json["robots"] == [0]
+
+
 def test_emergency_stop_works_from_every_screen_first_of_all_robots_then_of_its_own(hand):
     stop = hand.page.get_by_role("button", name="Emergency stop")
     expect(hand.page.get_by_text("Stops all robots.")).to_be_visible()
@@ -335,10 +340,10 @@ def test_emergency_stop_works_from_every_screen_first_of_all_robots_then_of_its_
     hand.hold()
     for screen in ("Main", "Authentication", "Calibration", "Instructions"):
         hand.go(screen)
-        with hand.page.expect_response("**/api/emergency") as answer:
+        # A robot of another test may not have confirmed yet, and is stopped again meanwhile.
+        with hand.page.expect_response(is_of_its_own) as answer:
             stop.tap()
         assert answer.value.json()["ok"], screen
-        assert '"robots":[0]' in (answer.value.request.post_data or ""), screen
 
 
 def test_without_a_sensor_the_stick_keys_and_gamepad_steer(running, visits):

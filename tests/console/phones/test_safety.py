@@ -94,6 +94,14 @@ def test_an_emergency_goes_out_before_session_and_calibration(page):
     assert sent
 
 
+def test_a_robot_that_refuses_an_emergency_has_not_stopped(page):
+    assert page.register(kind="Robot", label="no robot")["ok"]
+    page.let(3.0)
+    done, text = page.do("emergency", robots="all")
+    assert not done
+    assert "no robot has not stopped" in text
+
+
 def test_an_emergency_names_a_robot_or_is_for_ones_own(page):
     assert page.register()["ok"]
     done, text = page.do("emergency")

@@ -119,7 +119,7 @@ def measured_in_commands(path: Path, asked_cells: Sequence[AskedCell]) -> dict[s
                 own = run.setdefault(row["person"], [])
                 if row["arrived_s"]:
                     own.append((float(row["made_s"]), float(row["arrived_s"])))
-    except (OSError, UnicodeDecodeError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, csv.Error) as error:
         raise ConfigError(f"cannot be read as a table of commands: {error}", path) from None
     return {
         cell.config: Measured(

@@ -230,7 +230,7 @@ def read_kept(name: str = KEPT) -> dict[tuple[str, tuple[int, ...]], dict[str, P
     try:
         with path.open(encoding="utf-8", newline="") as file:
             return {_key(row): _kept_bands(row) for row in csv.DictReader(file)}
-    except (OSError, UnicodeDecodeError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, csv.Error) as error:
         raise ConfigError(f"cannot be read as a table of predictions: {error}", path) from None
 
 
