@@ -37,7 +37,7 @@ PEER_STATUS = "peer|"
 HEARTBEAT_PERIOD = 2.0  # design: time between two heartbeats [s]
 FIRST_WORD = 2.0  # design: time after which a named DVA counts as not answering [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was refused or not answered [s]
-REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not save [s]
+REPORT_AGAIN = 5.0  # design: pause after a report that no DVA has recorded [s]
 MAX_BID = 1e6  # design: longest arrival time of a bid [s]
 RENEW_PERIOD = 10.0  # design: time between two registrations [s]
 
@@ -115,6 +115,8 @@ class AgentDevice:
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
     _dva_beats: Subscription | None = None
+    _findings: dict[int, m.EventReport] = field(default_factory=dict)  # the last of each event
+    _progress: tuple[int, str] = (0, "")  # of its order, as last said
     _turns: bool = False  # a registration with another DVA is in progress
 
     def __post_init__(self) -> None:
@@ -531,25 +533,54 @@ class AgentDevice:
         on_reply: Callable[[m.Reply], object] = do_nothing,
         on_failure: Callable[[], object] = do_nothing,
     ) -> None:
-        """Report a finding to the DVA, and repeat it while the DVA is too busy to record it.
+        """Report a finding until a DVA records or refuses it: this one, or the next it comes to.
 
         Args:
             body: The finding.
             on_reply: Callback for the first reply.
-            on_failure: Called if no reply arrives.
+            on_failure: Called if no reply to the first request arrives.
         """
-        life = self._life
+        event_id = body.event_id or 0
+        self._findings[event_id] = body
+        repeat = self._in_this_life(REPORT_AGAIN, self.report_finding, body)
+
+        def again() -> None:
+            if self._findings.get(event_id) is body:  # nothing else was found there since
+                repeat()
 
         def answered(reply: m.Reply) -> None:
             on_reply(reply)
-            if reply.code == m.BUSY and life == self._life:
-                self.clock.call_after(REPORT_AGAIN, self.report_finding, body)
+            if reply.code == m.BUSY:
+                again()
 
-        self.ask(self.dva, body, answered, on_failure)
+        def unheard() -> None:
+            on_failure()
+            again()
+
+        self.ask(self.dva, body, answered, unheard)
 
     def progress(self, event_id: int, state: str) -> None:
-        """Tell the DVA how an order stands."""
-        self.ask(self.dva, m.OrderProgress(event_id, state))
+        """Tell the DVA how an order stands, until it answers or the order stands differently."""
+        self._progress = event_id, state
+        repeat = self._in_this_life(REPORT_AGAIN, self.progress, event_id, state)
+
+        def unheard() -> None:
+            if self._progress == (event_id, state):
+                repeat()
+
+        self.ask(self.dva, m.OrderProgress(event_id, state), on_failure=unheard)
+
+    def _in_this_life(
+        self, delay: float, action: Callable[..., object], *args: object
+    ) -> Callable[[], None]:
+        """Return a callback that acts after a delay [s], unless the device restarts or leaves."""
+        life = self._life
+
+        def act() -> None:
+            if life == self._life:
+                action(*args)
+
+        return partial(self.clock.call_after, delay, act)
 
     def publish(self, topic: str, body: m.Body, to: str | None = None) -> None:
         """Publish a message to all subscribers; its header names the DVA or another receiver."""

@@ -216,7 +216,7 @@ class PersonGuard(OnFoot):
             self.device.progress(order.event_id, "arrived")
 
     def _tell(self, body: m.EventReport, done: str, on_result: OnResult) -> None:
-        """Report a finding; one that the DVA cannot keep yet is reported again by itself."""
+        """Report a finding; one that the DVA does not keep yet is reported again by itself."""
 
         def answered(reply: m.Reply) -> None:
             later = "; the DVA cannot store that yet, so it is sent again"
@@ -224,8 +224,10 @@ class PersonGuard(OnFoot):
             text = done + (later if reply.code == m.BUSY else "")
             on_result(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])
 
-        unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
-        self.device.report_finding(body, answered, unreachable)
+        def unheard() -> None:
+            on_result(False, "the DVA does not answer; it is sent again until it does")
+
+        self.device.report_finding(body, answered, unheard)
 
     def _ask(self, body: m.Body, done: str, on_result: OnResult) -> None:
         def answered(reply: m.Reply) -> None:

@@ -162,7 +162,11 @@ EVENT_COLUMNS = (
     text("outcome", "confirmed, contained, refuted, escalated, expired, open or undetected"),
     Measure("t_occurred_s", "when it began"),
     *(Measure(f"t_{step}_s", meaning) for step, meaning in _STEPS.items()),
-    Measure("response_s", "detection until somebody is on scene", title="response time"),
+    Measure(
+        "response_s",
+        "detection until somebody is on scene, or has confirmed it",
+        title="response time",
+    ),
     Measure("confirmation_s", "detection until it is confirmed", title="confirmation time"),
     Measure("containment_s", "detection until it is contained"),
     Measure("closing_s", "detection until it is closed"),
@@ -415,7 +419,8 @@ def _event_row(recording: Recording, number: int) -> Row:
         if event.responder is not None:
             row["responder_kind"] = "robot" if event.operator else "guard"
             row["responder"] = recording.label_of(event.responder)
-    row["response_s"] = row["t_arrived_s"] - row["t_detected_s"]
+    # A message that tells of an arrival may be lost, but who confirms an event is there.
+    row["response_s"] = times.get("arrived", row["t_confirmed_s"]) - row["t_detected_s"]
     row["confirmation_s"] = row["t_confirmed_s"] - row["t_detected_s"]
     row["containment_s"] = row["t_contained_s"] - row["t_detected_s"]
     row["closing_s"] = row["t_closed_s"] - row["t_detected_s"]
