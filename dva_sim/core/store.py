@@ -114,7 +114,7 @@ class Store:
             (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
             version = self._about("format") if tables else None
             is_ours = version in (None, *OLDER, FORMAT)
-        except (sqlite3.OperationalError, ValueError) as error:
+        except (sqlite3.OperationalError, ValueError, OverflowError) as error:
             # A database without the table `about` is another program's, and sound.
             if "no such" not in str(error):
                 raise self._useless(error) from None

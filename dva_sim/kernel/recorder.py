@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.kernel.labels import visible
 from dva_sim.kernel.makers import maker
 
 
@@ -335,8 +336,8 @@ class Recorder:
         self.on_hand: Callable[[ByHand], object] = lambda _: None
 
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
-        """Add a line to the timeline."""
-        self.timeline.append(Moment(time, who, what, kind))
+        """Add a line to the timeline; what others say in it can hide nothing."""
+        self.timeline.append(Moment(time, who, visible(what), kind))
 
     def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
         """Record the position that an operator assumes for a robot, if pictures are wanted."""

@@ -267,7 +267,7 @@ def verify(path: Path) -> Verified:
     with closing(_opened(path)) as file:
         try:
             return _followed(file)
-        except (sqlite3.Error, TypeError) as error:
+        except (sqlite3.Error, ValueError, TypeError) as error:
             return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log: {error}"))
 
 
@@ -357,7 +357,7 @@ def _holds_nothing(path: Path) -> bool:
     try:
         with closing(_opened(path)) as file:
             return not file.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):  # of what is wrong, in the words of the file
         return False
 
 

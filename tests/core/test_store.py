@@ -431,11 +431,11 @@ def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file):
     assert file.read_bytes() == before
 
 
-@pytest.mark.parametrize("value", [0, 4])
+@pytest.mark.parametrize("value", [0, 4, "9e999"])
 def test_a_memory_of_another_format_is_refused(file, value):
     Store(file).close()
     by_hand(file, f"UPDATE about SET value = {value} WHERE name = 'format'")
-    assert refusal(file).endswith("memory of format 3")
+    assert "DVA's memory" in refusal(file)
 
 
 def test_a_file_that_another_holds_cannot_be_opened(file, monkeypatch):

@@ -12,7 +12,7 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -36,6 +36,7 @@ from dva_sim.console.wire.kinds import BadMessage, Kind, hints_of
 from dva_sim.console.wire.roles import Role
 from dva_sim.core.assignments import Rules
 from dva_sim.core.store import Store
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualSubscription
@@ -326,7 +327,7 @@ def read_bridge(data: bytes) -> str:
     from dva_sim.ros.readings import BadReading, RosReader
     from dva_sim.ros.websocket import WebSocketUrl
 
-    said = []
+    recorder = Recorder()
     reader = RosReader(RosProfile())
     takes = {
         "nav_msgs/Odometry": reader.odometry,
@@ -340,7 +341,7 @@ def read_bridge(data: bytes) -> str:
         try:
             takes[kind](message)
         except BadReading as error:
-            said.append(str(error))
+            recorder.tell(0.0, kind, str(error))
 
     topics = {
         f"/{kind}": Subscribed(kind, lambda message, one=kind: take(one, message), 4_000_000)
@@ -351,8 +352,8 @@ def read_bridge(data: bytes) -> str:
         WebSocketUrl("ws://127.0.0.1:1", "--ros"),
         topics,
         {},
-        on_change=said.append,
-        on_bad=lambda *why: said.append(" ".join(why)),
+        on_change=partial(recorder.tell, 0.0, "bridge"),
+        on_bad=partial(recorder.tell, 0.0),
     )
     for line in data.splitlines():
         client._take(line)
@@ -361,7 +362,7 @@ def read_bridge(data: bytes) -> str:
     client._take(b'{"op": "service_response", "id": "last", "values": {"success": true}}')
     if not answers:
         raise Unanswered("an answer is not taken any more")
-    return "\n".join(said)
+    return "\n".join(moment.what for moment in recorder.timeline)
 
 
 BRIDGED = {

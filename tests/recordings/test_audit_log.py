@@ -254,6 +254,13 @@ def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path):
     assert path.read_text() == "notes"
 
 
+def test_a_log_whose_tables_are_described_in_no_letters_is_no_log(log):
+    log.write_bytes(log.read_bytes().replace(b"CREATE TABLE about", b"CREATE TABLE \xffbout"))
+    with pytest.raises(ConfigError, match="is not an audit log"):
+        AuditLog(log)
+    assert verify(log).rows == 0
+
+
 @pytest.mark.parametrize("make", [Path.touch, lambda path: None])
 def test_a_file_that_is_empty_or_not_there_becomes_a_log(tmp_path, make):
     path = tmp_path / "audit.sqlite"

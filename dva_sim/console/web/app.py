@@ -12,7 +12,6 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import (
     HTMLResponse,
-    JSONResponse,
     PlainTextResponse,
     RedirectResponse,
     Response,
@@ -31,7 +30,7 @@ from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.login_pages import LOGIN_PAGE, LOGIN_STYLE, LOGOUT, LoginPages
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.relay import NoPictures, open_camera
-from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
+from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, json_answer, problem
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import place_of
 from dva_sim.serving.port_guard import facts_of
@@ -203,7 +202,7 @@ class Pages:
         """`GET /healthz`: 200 while the simulation runs, else 503."""
         runs = self._simulation.runs
         body = {"status": "ok" if runs else "the simulation does not run"}
-        return JSONResponse(body, 200 if runs else 503, headers=NOT_KEPT)
+        return json_answer(body, 200 if runs else 503)
 
     async def stream(self, request: Request) -> Response:
         """`GET /camera/LABEL.mjpg`: a stream of JPEGs of a robot's camera."""

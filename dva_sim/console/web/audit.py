@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from dva_sim.console.audit.audit_measures import measured
-from dva_sim.console.web.rest import NOT_KEPT, problem
+from dva_sim.console.web.rest import NOT_KEPT, json_answer, problem
 from dva_sim.console.wire.audit_answers import AuditCheck
 from dva_sim.kernel.csv_cells import harmless_row
 from dva_sim.kernel.errors import ConfigError
@@ -55,13 +55,11 @@ class AuditPages:
     def _rows(self, path: Path, after: int) -> Response:
         rows = rows_of(path, after, MAX_ROWS)
         body = {"rows": [plain_row(row) for row in rows], "more": len(rows) == MAX_ROWS}
-        return JSONResponse(body, headers=NOT_KEPT)
+        return json_answer(body)
 
     async def measures(self, _: Request) -> Response:
         """`GET /api/audit/measures`: times to acknowledge and to assign, and overrides."""
-        return await self._read(
-            lambda path: JSONResponse(measured(rows_of(path)), headers=NOT_KEPT)
-        )
+        return await self._read(lambda path: json_answer(measured(rows_of(path))))
 
     async def check(self, _: Request) -> Response:
         """`GET /api/audit/check`: the first row at which the chain of hashes breaks, if any."""
@@ -118,7 +116,7 @@ def _checked(path: Path) -> Response:
             doubt for doubt in verified.doubts if "not an end" not in doubt
         ],  # it still runs
     }
-    return JSONResponse(body, headers=NOT_KEPT)
+    return json_answer(body)
 
 
 def _file(suffix: str, kind: str, text: str) -> Response:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_entries import Entry
@@ -25,7 +25,7 @@ from dva_sim.console.web.logs import (
     LogFilter,
     Looks,
 )
-from dva_sim.console.web.rest import NOT_KEPT, ROLE, problem
+from dva_sim.console.web.rest import NOT_KEPT, ROLE, json_answer, problem
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.roles import Role
 from dva_sim.protocol import messages as m
@@ -62,7 +62,7 @@ class LogRequests:
         below = int(before) if before else None
         entries = log.find(log_filter, self._logs.names, below, ENTRIES_PER_LINE)
         lines = [looks.brief(entry) for entry in entries]
-        return JSONResponse({"lines": lines, "total": log.newest}, headers=NOT_KEPT)
+        return json_answer({"lines": lines, "total": log.newest})
 
     async def entry(self, request: Request) -> Response:
         """`GET /api/logs/NAME/N`: one exchange, whole."""
@@ -70,7 +70,7 @@ class LogRequests:
         if entry is None:
             return problem(404, "this exchange is not kept any more")
         body = whole(entry) | {"labels": self._labels(entry)}
-        return JSONResponse(body, headers=NOT_KEPT)
+        return json_answer(body)
 
     async def export(self, request: Request) -> Response:
         """`GET /api/logs/NAME/export?...`: lines that match, as an archive of messages."""

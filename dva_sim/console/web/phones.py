@@ -6,11 +6,11 @@ import hashlib
 from dataclasses import dataclass
 
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 
 from dva_sim.console.pages.qr_code import svg
 from dva_sim.console.web import static_files
-from dva_sim.console.web.rest import NOT_KEPT
+from dva_sim.console.web.rest import NOT_KEPT, json_answer
 from dva_sim.kernel.errors import DvaSimError
 
 AUTHORITY = "/trust/dva-sim.crt"
@@ -58,7 +58,7 @@ class PhonePages:
 
     async def about(self, _: Request) -> Response:
         """`GET /api/phones`: the address for phones."""
-        return JSONResponse({"address": self._door and self._door.address}, headers=NOT_KEPT)
+        return json_answer({"address": self._door and self._door.address})
 
     async def code(self, _: Request) -> Response:
         """`GET /api/phones.svg`: the same address as a QR code."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import json
 import secrets
 import time
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from dva_sim.console.web.actions import NotAllowed, asked_of, check_role, id_of, is_id, read
 from dva_sim.console.web.hub import Hub
@@ -98,14 +99,14 @@ class Rest:
     async def state(self, _: Request) -> Response:
         """`GET /api/state`: the state of the run, with units in the names."""
         body = state_of(self._simulation.state, len(self._hub.clients.here()))
-        return JSONResponse(body, headers=NOT_KEPT)
+        return json_answer(body)
 
     async def site(self, request: Request) -> Response:
         """`GET /api/site`: the plan of the site, which does not change."""
         scene = self._simulation.state.scene
         if scene is None or "site" not in scene:
             return problem(503, "nothing has begun")
-        response = JSONResponse(scene["site"])
+        response = json_answer(scene["site"])
         tag = f'"{hashlib.sha256(response.body).hexdigest()[:32]}"'
         headers = {"ETag": tag, "Cache-Control": "no-cache"}
         if tag in request.headers.get("if-none-match", ""):
@@ -123,7 +124,7 @@ class Rest:
         first = min(max(int(start), oldest), state.story_count)
         lines = list(state.story)[first - oldest :]
         body = {"from": first, "next": state.story_count, "lines": lines}
-        return JSONResponse(body, headers=NOT_KEPT)
+        return json_answer(body)
 
     async def action(self, request: Request) -> Response:
         """`POST /api/actions`: the answer to an action; repeating its id does nothing twice."""
@@ -135,7 +136,7 @@ class Rest:
             client = self._client(body, role)
             if name == "gone":
                 self._simulation.send({"do": "gone", "client": client})
-                return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
+                return json_answer({"ok": True, "text": ""})
             action_request = asked_of(name, body.get("arguments", {}), self._simulation.labels)
             key = id_of(body.get("id"))
             if ACTIONS[action_request["do"]].seats and "key" not in body:
@@ -211,7 +212,7 @@ class Rest:
     def _answer(self, line: Answer) -> Response:
         body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
         body |= {name: line[name] for name in ("client", "key", "outcome") if name in line}
-        return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
+        return json_answer(body, 504 if line.get("late") else 200)
 
 
 def _program(role: Role) -> str:
@@ -264,6 +265,11 @@ class TooStrange(Exception):
         self.status = status
 
 
+def json_answer(body: Any, status: int = 200) -> Response:
+    """Return an answer that nobody keeps; half characters, as names may hold, are escaped."""
+    return Response(json.dumps(body, allow_nan=False), status, NOT_KEPT, "application/json")
+
+
 def problem(status: int, text: str) -> Response:
     """Return an answer that says in one line why nothing was done."""
-    return JSONResponse({"ok": False, "text": visible(text)}, status, headers=NOT_KEPT)
+    return json_answer({"ok": False, "text": visible(text)}, status)

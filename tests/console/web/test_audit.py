@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.console.audit.audit_measures import measured
 from dva_sim.console.web.audit import csv_of
+from dva_sim.console.web.rest import json_answer
 from dva_sim.console.wire.audit_answers import AuditCheck, AuditMeasures
 from dva_sim.recordings.audit_log import (
     BEGIN,
@@ -152,6 +154,10 @@ def test_times_count_the_first_time_for_each_event_and_overrides_are_told():
     assert found["overrides"] == 2
     assert found["lost_s"] == 33.0
     assert [one["advised"] for one in found["newest_overrides"]] == ["robot-2", None]
+
+
+def test_half_a_character_in_an_answer_is_escaped():
+    assert json.loads(json_answer({"author": "\ud800"}).body) == {"author": "\ud800"}
 
 
 def test_of_a_log_without_decisions_there_is_nothing_to_measure():

@@ -13,6 +13,8 @@ from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed
 
+from dva_sim.console.web.logs import KeptLogs, Looks
+from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.mistakes import check_message
 
@@ -135,3 +137,9 @@ def test_a_phone_may_not_look_at_logs(console):
     page.ws.send(json.dumps({"do": "look", "logs": {"dva": {}}}))
     with pytest.raises(ConnectionClosed, match="no such message"):
         page.next("log")
+
+
+@pytest.mark.parametrize("tables", ["devices", [{}], [["devices"]], ["robots"]])
+def test_tables_that_there_are_not_are_not_looked_at(tables):
+    with pytest.raises(BadMessage, match="tables"):
+        Looks(KeptLogs(), False).look({}, tables)

@@ -26,6 +26,7 @@ HALL = {
     "horizon_s": 200,
 }
 WEST, EAST = id_of("dva", 1), id_of("dva", 2)
+GUARD = id_of("guard", 2)
 
 
 def hall(**changes) -> Run:
@@ -133,6 +134,17 @@ def test_a_deputy_goes_on_where_a_dva_was_killed_while_a_guard_was_under_way():
     assert event.times["assigned"] < 20.0
     assert run.dvas[WEST].core.division.claims["east"] == (2, WEST)
     assert {guard.device.dva for guard in run.field.guards} == {WEST}
+    assert not recording.recorder.broken
+
+
+@pytest.mark.parametrize("at_s", [67.0, 69.0])  # before the guard arrives, and before he has looked
+def test_what_a_guard_finds_while_his_dva_dies_is_reported_to_the_deputy(at_s):
+    run = hall(dva__deaths=[{"region": "east", "at_s": at_s}], horizon_s=100.0)
+    recording = run.run()
+    (event,) = recording.events
+    assert (event.number, event.state, event.responder) == (1_000_001, "confirmed", GUARD)
+    assert at_s < event.times["confirmed"] < at_s + 25.0
+    assert not run.dvas[WEST].core.orders.engaged
     assert not recording.recorder.broken
 
 
