@@ -37,6 +37,7 @@ PEER_STATUS = "peer|"
 HEARTBEAT_PERIOD = 2.0  # design: time between two heartbeats [s]
 FIRST_WORD = 2.0  # design: time after which a named DVA counts as not answering [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was refused or not answered [s]
+UNUSED_FOR = 600.0  # design: time without a request after which a connection is closed [s]
 REPORT_AGAIN = 5.0  # design: pause after a report that no DVA has recorded [s]
 MAX_BID = 1e6  # design: longest arrival time of a bid [s]
 RENEW_PERIOD = 10.0  # design: time between two registrations [s]
@@ -111,6 +112,7 @@ class AgentDevice:
     _refusal: str = ""  # last reported reason of a refused registration
     _life: int = 0  # number of restarts; repeated actions end with their life
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
+    _connected: set[str] = field(default_factory=set)  # peers that requests shall not wait for
     _addresses: dict[str, str] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
@@ -154,6 +156,9 @@ class AgentDevice:
             hear = self._on_dva_beat
             self._dva_beats = self.network.subscribe(self.id_tag, self.dva, HEARTBEAT, hear)
         self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
+        self.clock.every(
+            UNUSED_FOR, partial(self._disconnect_unused, self._life), self.clock.now + UNUSED_FOR
+        )
 
     def look_for_dva_at(self, address: str) -> None:
         """Name an address in messages about the DVA, and report soon if nobody answers there."""
@@ -343,6 +348,7 @@ class AgentDevice:
 
     def connect(self, peer: str) -> None:
         """Connect to a peer now: over a long link the first request need not wait for that."""
+        self._connected.add(peer)
         for urgent in (True, False):
             self._requester(peer, urgent).open()
 
@@ -362,6 +368,7 @@ class AgentDevice:
     def forget(self, peer: str) -> None:
         """Forget a peer that has left; open requests to it fail."""
         self.give_up(peer)
+        self._connected.discard(peer)
         self._addresses.pop(peer, None)
         self.network.forget(peer)
 
@@ -610,6 +617,13 @@ class AgentDevice:
         if life == self._life:
             self.publish(HEARTBEAT, m.Heartbeat())
             self._look_for_dva()
+        return life == self._life
+
+    def _disconnect_unused(self, life: int) -> bool:
+        """Close connections to peers of whom nothing was asked: they leave without a word."""
+        for (peer, _), requester in self._requesters.items():
+            if peer not in self._connected:
+                requester.rest()
         return life == self._life
 
     def _on_dva_beat(self, data: bytes) -> None:

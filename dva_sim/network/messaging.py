@@ -182,6 +182,7 @@ class Requester:
         self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
         self._wire: Wire | None = None
         self._last_tag = 0
+        self._tag_at_rest = -1
         self.on_timeout: Callable[[], object] = lambda: None
         self.timeouts = self.failures = self.overflows = 0
         self.round_trips: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
@@ -218,6 +219,12 @@ class Requester:
         self._disconnect()
         for request in list(self._open.values()):
             self._attempt(request)
+
+    def rest(self) -> None:
+        """Disconnect, until the next request, if there was none since the last call."""
+        if self._last_tag == self._tag_at_rest and not self._open:
+            self._disconnect()
+        self._tag_at_rest = self._last_tag
 
     def give_up(self) -> None:
         """Give up a peer that has gone for good; all pending requests fail."""

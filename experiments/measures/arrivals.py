@@ -1,6 +1,7 @@
 """Measures of whether somebody came, for runs in which the DVA may die before it hears of an event.
 
-The measures of a run count events that the DVA knew of; these count all that were noticed.
+The measures of a run count events that the DVA knew of; these count all that were noticed. Who
+confirms an event has come: where no arrival was heard of, as in an outage, the confirmation counts.
 """
 
 import math
@@ -14,8 +15,9 @@ def waits(recording):
     for number, incident in enumerate(recording.incidents):
         if incident.detected < recording.scenario.horizon_s:
             event = recording.event_of(number)
-            arrived = None if event is None else event.times.get("arrived")
-            yield None if arrived is None else arrived - incident.detected
+            times = {} if event is None else event.times
+            came = times.get("arrived", times.get("confirmed"))
+            yield None if came is None else came - incident.detected
 
 
 class NoticedResponse(RunMeasure):

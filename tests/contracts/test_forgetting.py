@@ -9,6 +9,7 @@ from helpers.dva.dispatch_office import Office
 from helpers.network.transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
 from helpers.processes.memory import needs_proc, resident_bytes
 
+from dva_sim.agents import device as agents_device
 from dva_sim.agents.device import HEARTBEAT, AgentDevice
 from dva_sim.network import sockets
 from dva_sim.network.realtime import LiveClock
@@ -115,6 +116,25 @@ def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(world, monke
     world.run_until(lambda: ROBOT not in site.entries)
     assert failed == [True]
     assert not site.dva.device._requesters
+
+
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_a_connection_that_is_not_used_is_closed_until_the_next_request(
+    is_kept, world, monkeypatch
+):
+    monkeypatch.setattr(agents_device, "UNUSED_FOR", 4 * BEAT)
+    site, phone = site_with(PHONE, world, monkeypatch)
+    phone.introduce(ROBOT, site.device(ROBOT).address)
+    if is_kept:  # so that an emergency never waits for a connection
+        phone.connect(ROBOT)
+    phone.register()
+    codes: list[int] = []
+    for asked in (1, 2):
+        phone.ask(ROBOT, m.GetSensorInfo(), lambda reply: codes.append(reply.code))
+        world.run_until(lambda number=asked: len(codes) == number)
+        world.run_for(12 * BEAT)
+        assert (phone._requesters[ROBOT, False]._wire is not None) == is_kept
+    assert codes == [m.OK, m.OK]
 
 
 @pytest.mark.invariant("S2")
