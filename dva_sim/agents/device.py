@@ -566,16 +566,38 @@ class AgentDevice:
 
         self.ask(self.dva, body, answered, unheard)
 
-    def progress(self, event_id: int, state: str) -> None:
-        """Tell the DVA how an order stands, until it answers or the order stands differently."""
+    def progress(
+        self,
+        event_id: int,
+        state: str,
+        on_reply: Callable[[m.Reply], object] = do_nothing,
+        on_failure: Callable[[], object] = do_nothing,
+    ) -> None:
+        """Tell the DVA how an order stands, until one books it or the order stands differently.
+
+        Args:
+            event_id: Event of the order.
+            state: State as in the message.
+            on_reply: Callback for the first reply.
+            on_failure: Called if no reply to the first request arrives.
+        """
         self._progress = event_id, state
         repeat = self._in_this_life(REPORT_AGAIN, self.progress, event_id, state)
 
-        def unheard() -> None:
+        def again() -> None:
             if self._progress == (event_id, state):
                 repeat()
 
-        self.ask(self.dva, m.OrderProgress(event_id, state), on_failure=unheard)
+        def answered(reply: m.Reply) -> None:
+            on_reply(reply)
+            if reply.code == m.BUSY:
+                again()
+
+        def unheard() -> None:
+            on_failure()
+            again()
+
+        self.ask(self.dva, m.OrderProgress(event_id, state), answered, unheard)
 
     def _in_this_life(
         self, delay: float, action: Callable[..., object], *args: object

@@ -254,8 +254,8 @@ class OperatorAgent:
             else:
                 # The DVA takes the robot back with the order, unless it has ended that before,
                 # or has meanwhile given the order for another robot.
-                body = m.OrderProgress(order.event_id, "done" if is_decided else "failed")
-                device.ask(device.dva, body, ended, unheard)
+                state = "done" if is_decided else "failed"
+                device.progress(order.event_id, state, ended, unheard)
             if self._waiting and drive.session:
                 # Before it stands, the robot would refuse to start.
                 self.device.clock.call_after(self._habits.stands_after_s, self._put_away, drive)

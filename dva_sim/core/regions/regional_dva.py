@@ -175,10 +175,10 @@ class RegionalDva(Dva):
         match body:
             case m.EventReport(event_id=None, position=place):
                 self.deputy.reported(message.source, self.division.region_at(place))
-            case m.EventReport(event_id=int(number)):
-                self.deputy.let_go(message.source, number)
-            case m.OrderProgress(event_id=number, state="declined" | "failed" | "done"):
-                self.deputy.let_go(message.source, number)
+            case m.EventReport(event_id=int(number)) | m.OrderProgress(event_id=number):
+                if self.deputy.may_go_on(message.source, number):
+                    text = f"event {number} may be taken over soon; say it again then"
+                    return DvaAnswer(m.BUSY, text)
         if isinstance(body, m.GetGrant) and entry is not None and entry.kind == ROBOT:
             self.leases.bring(message.source, body, message.session or 0, now)
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):

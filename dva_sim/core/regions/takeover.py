@@ -135,13 +135,10 @@ class Deputy:
         if entry is not None and any(device in self._sent(copy.status) for copy in copies):
             entry.free_from = now + COME_WITHIN
 
-    def let_go(self, device: str, number: int) -> None:
-        """Note that a device has ended its work at a copied event, unheard by the event's DVA."""
-        for copies in self.copies.values():
-            copy = copies.get(number)
-            if copy is not None and device in self._sent(copy.status):
-                nobody = replace(copy.status, responder=None, operator=None, actor=None)
-                copies[number] = copy._replace(status=nobody)
+    def may_go_on(self, device: str, number: int) -> bool:
+        """Return True if a device reports on an event that this DVA may go on with soon."""
+        copies = (kept[number] for kept in self.copies.values() if number in kept)
+        return any(device in self._sent(copy.status) for copy in copies)
 
     def reported(self, device: str, region: str) -> None:
         """Note a report about a region: a detector that has come here may be of that region."""

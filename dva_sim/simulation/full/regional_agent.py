@@ -40,6 +40,8 @@ class RegionalDvaAgent(DvaAgent):
         self._request: Request | None = None  # that is being taken
         self._facts = 0
         self._copied: dict[int, int] = {}  # newest fact of each event that waits for its copy
+        self._held_by: dict[str, dict[int, Event]] = {}  # events that a deputy has open, by deputy
+        self._missed: set[int] = set()  # events whose newest state a deputy has not heard of
         self._held: dict[int, list[Callable[[str], object]]] = {}  # by fact
         self._told: m.PeerStatus | None = None
 
@@ -84,6 +86,7 @@ class RegionalDvaAgent(DvaAgent):
             entry = self._regional.registry.entries.get(peer)
             if entry is not None and entry.silent:
                 self.device.give_up(peer)
+        self._catch_up()
         served = tuple(m.ServedRegion(*each) for each in self._regional.division.served())
         if goes_on and self._told is not None and self._told.regions != served:
             news = sorted({s.region for s in served} - {s.region for s in self._told.regions})
@@ -242,6 +245,9 @@ class RegionalDvaAgent(DvaAgent):
         self._facts += 1
         fact = self._facts
         self._copied[event.number] = fact
+        self._missed.discard(event.number)
+        held = self._held_by.setdefault(deputy, {})
+        held[event.number] = event
 
         def settled(text: str) -> None:
             if self._copied.get(event.number) == fact:
@@ -250,6 +256,28 @@ class RegionalDvaAgent(DvaAgent):
                 release(text)
 
         def answered(reply: m.Reply) -> None:
+            if body.event.closed_for is not None:
+                held.pop(event.number, None)
             settled("" if reply.code == m.OK else UNREPLICATED)
 
-        self._ask_peer(deputy, body, answered, partial(settled, UNREPLICATED))
+        def unheard() -> None:
+            if self._copied.get(event.number) == fact:
+                self._missed.add(event.number)
+            settled(UNREPLICATED)
+
+        self._ask_peer(deputy, body, answered, unheard)
+
+    def _catch_up(self) -> None:
+        """Tell each deputy that is there again what it has missed, the end of events above all."""
+        division = self._regional.division
+        for deputy, held in self._held_by.items():
+            for number, event in list(held.items()):
+                region = division.region_at(event.position)
+                is_due = not event.open or number in self._missed
+                if division.claims[region].dva != division.own:
+                    del held[number]  # another DVA goes on with it
+                elif is_due and number not in self._copied and self._is_deputy(deputy, region):
+                    self._replicate(event)
+
+    def _is_deputy(self, peer: str, region: str) -> bool:
+        return self._regional.division.deputy_of(region, self._regional.registry) == peer

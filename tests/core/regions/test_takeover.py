@@ -157,20 +157,24 @@ def test_a_dva_that_was_started_again_gets_its_events_back_with_their_ages():
 
 
 @pytest.mark.parametrize(
-    ("device", "ended"),
+    ("said", "state"),
     [
-        (GUARD, m.EventReport(7, "fire", east(10), 0.5, 0.9, "refuted")),
-        (GUARD, m.OrderProgress(7, "done")),
-        (GUARD, m.OrderProgress(7, "failed")),
+        (m.EventReport(7, "fire", east(10), 0.5, 0.9, "confirmed"), State.CONFIRMED),
+        (m.EventReport(7, "fire", east(10), 0.5, 0.9, "refuted"), State.REFUTED),
+        (m.OrderProgress(7, "done"), State.ASSIGNED),
+        (m.OrderProgress(7, "failed"), State.ASSIGNED),
     ],
 )
-def test_an_event_whose_responder_has_ended_before_the_takeover_is_open_again(device, ended):
+def test_what_a_responder_says_before_the_takeover_is_busy_and_counts_after_it(said, state):
     street = dead_west("on_scene", responder=GUARD)
-    street.say(EAST, device, ended)
+    assert street.say(EAST, GUARD, said).code == m.BUSY
     street.tick(5, GUARD)
-    event = street.cores[EAST].events.open[7]
-    assert street.told(GUARD, m.Order) == [m.Order(7, "fire", east(10), None)]
-    assert event.state is State.ASSIGNED
+    assert street.cores[EAST].events.get(7).state is State.ON_SCENE
+    assert street.say(EAST, GUARD, said).code == m.OK
+    street.tick(1, GUARD)
+    assert street.cores[EAST].events.get(7).state is state
+    is_sent_again = state is State.ASSIGNED
+    assert street.told(GUARD, m.Order) == [m.Order(7, "fire", east(10), None)] * is_sent_again
 
 
 @pytest.mark.parametrize(

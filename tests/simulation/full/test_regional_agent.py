@@ -244,6 +244,16 @@ def test_an_outage_of_the_backbone_parts_dvas_and_nobody_else():
     assert not run.recorder.broken
 
 
+def test_a_deputy_hears_of_the_end_of_an_event_after_an_outage():
+    run = hall(dva__backbone={"outages": [{"from_s": 65.0, "for_s": 20.0}]})
+    run.clock.run(84.0)
+    (event,) = run.dvas[EAST].core.events.closed.values()
+    assert 65.0 < event.times["closed"] < 84.0
+    assert [*run.dvas[WEST].core.deputy.copies["east"]] == [event.number]
+    run.clock.run(100.0)
+    assert not run.dvas[WEST].core.deputy.copies["east"]
+
+
 def test_the_same_seed_gives_the_same_run_over_a_backbone_with_losses():
     lossy = {"delay_s": 0.05, "jitter_s": 0.02, "loss": 0.2}
     one, other = (hall(dva__backbone=lossy).run() for _ in range(2))
