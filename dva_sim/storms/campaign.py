@@ -14,6 +14,7 @@ from typing import Any, Final
 from scipy.stats import chi2
 
 from dva_sim.experiments.execution.executors import Workers
+from dva_sim.experiments.study.hashing import fingerprint_of_storms
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms.drawing import draw
@@ -83,6 +84,8 @@ def drawn(seed: int, profile: str) -> StormPlan:
 class Journal:
     """Outcomes of storms in a file, one line each, so that a campaign can be resumed.
 
+    Those that another version of the program has played do not count, and stay in the file.
+
     Args:
         file: File; created if missing.
 
@@ -92,6 +95,7 @@ class Journal:
 
     def __init__(self, file: Path) -> None:
         self._file = file
+        self._code = fingerprint_of_storms()
         self.outcomes: dict[tuple[str, int], StormOutcome] = {}
         if not file.exists():
             return
@@ -100,7 +104,10 @@ class Journal:
         try:
             for line in lines.splitlines():
                 row = json.loads(line)
-                self.outcomes[row["profile"], row["seed"]] = outcome_of(row)
+                code = row.pop("code", "")
+                outcome = outcome_of(row)
+                if code == self._code:
+                    self.outcomes[row["profile"], outcome.seed] = outcome
         except (ValueError, KeyError, TypeError) as error:
             raise ConfigError(f"is no journal of storms: {error}", file) from None
         if rest:  # part of a line: a process was killed while it wrote
@@ -113,7 +120,7 @@ class Journal:
             DvaSimError: the disk is full, or refuses to be written.
         """
         self.outcomes[profile, outcome.seed] = outcome
-        line = json.dumps({"profile": profile, **plain(outcome)})
+        line = json.dumps({"code": self._code, "profile": profile, **plain(outcome)})
         try:
             with self._file.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")

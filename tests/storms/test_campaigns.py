@@ -41,6 +41,16 @@ def test_what_was_played_is_not_played_again(tmp_path, played):
     assert played[-1] == 0
 
 
+def test_what_another_version_has_played_is_played_again(tmp_path, played, monkeypatch):
+    file = tmp_path / "storms.jsonl"
+    play_all(file, range(2))
+    monkeypatch.setattr(campaign, "fingerprint_of_storms", lambda: "another")
+    assert play_all(file, range(2)) == [0, 1]
+    assert played == [0, 1, 0, 1]
+    assert play_all(file, range(2)) == [0, 1]
+    assert played == [0, 1, 0, 1]
+
+
 def test_a_journal_that_was_cut_short_loses_its_last_line_alone(tmp_path, played):
     file = tmp_path / "storms.jsonl"
     play_all(file, range(3))

@@ -108,6 +108,7 @@ _JUDGES = (
     "experiments/analysis/study_view.py",
     "statistics",
 )
+_STORMS = ("storms",)
 _TRACES = "experiments/traces"
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
@@ -125,6 +126,11 @@ def _simulating_code() -> tuple[tuple[str, bytes], ...]:
     Later changes of its files are not loaded.
     """
     return tuple(_digests(_code(_CODE)))
+
+
+def fingerprint_of_storms() -> str:
+    """Return 64 bits over all that a storm plays: what simulates, and what plans and judges it."""
+    return _hash_of((*_simulating_code(), *_digests((*_code(_STORMS), *edited_files()))))
 
 
 def fingerprint_of_judges() -> str:
