@@ -286,7 +286,7 @@ def make(share: LoadShare, supervised: bool = False) -> dict[str, Any]:
     Raises:
         DvaSimError: there are too few open files, or an address is not free.
     """
-    check_room_for(share.devices)
+    check_room_for(share.devices + share.sessions)  # each with a driver of its own
     network = SocketNetwork(LiveClock(), KeyRing(share.keys) if share.keys else None)
     try:
         devices = LoadDevices(

@@ -20,7 +20,7 @@ from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.limits import OWN_KEPT
 from dva_sim.console.wire.roles import Role
 
-MAX_CLIENTS = 64
+MAX_CLIENTS = 80  # design: 64 pages and 16 phones
 REMEMBERED = 30.0  # a page that is gone may come back under its name for so long [s]
 MAX_PROGRAMS = 64
 PROGRAM_REMEMBERED = 600.0  # a program's seat is given back after this without a request [s]

@@ -15,7 +15,7 @@ from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
-from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
+from dva_sim.console.web.clients import MAX_CLIENTS, REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.state import body_of, encode
 from dva_sim.console.wire.actions import ACTIONS
@@ -73,7 +73,9 @@ class Hub:
         """Serve a state socket until it closes."""
         key, page = (ws.query_params.get(name, "")[:64] for name in ("key", "page"))
         if self.clients.find(key, role) is None and not self._make_room(role):
-            await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
+            await ws.send_denial_response(
+                PlainTextResponse(f"{MAX_CLIENTS} pages are open already", 503)
+            )
             return
         if await self._is_over(ws):
             return

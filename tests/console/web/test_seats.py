@@ -7,6 +7,8 @@ from helpers.console.served_console import seat, serving
 from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import InvalidStatus
 
+from dva_sim.console.web.clients import MAX_CLIENTS
+
 
 @pytest.fixture(scope="module")
 def console():
@@ -137,12 +139,12 @@ def test_a_page_of_a_lower_role_makes_room_for_a_supervisors():
     with serving() as served:
         supervise = served.serving["supervise"].partition("?token=")[2]
         drivers = [served.page(served.drive) for _ in range(4)]
-        pages = [served.page(served.look) for _ in range(60)]
+        pages = [served.page(served.look) for _ in range(MAX_CLIENTS - 4)]
         with pytest.raises(InvalidStatus):
             served.socket("/ws/state", served.look)
         late = served.page(supervise)
         assert late.you["role"] == "supervise"
-        assert served.ask("/api/state", token=served.look).json["clients"] == 64
+        assert served.ask("/api/state", token=served.look).json["clients"] == MAX_CLIENTS
         for page in (*drivers, *pages[1:]):
             page.next("snap")  # the others are still served
         for page in (late, *drivers, *pages):

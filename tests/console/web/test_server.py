@@ -15,6 +15,8 @@ from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from dva_sim.console.web.clients import MAX_CLIENTS
+
 HEADERS = {
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",
@@ -500,9 +502,9 @@ def test_of_a_slow_page_the_rest_knows_nothing_and_it_is_dropped_in_the_end():
 
 
 @pytest.mark.system
-def test_64_pages_are_served_and_one_more_is_told_so():
+def test_as_many_pages_as_may_be_open_are_served_and_one_more_is_told_so():
     with serving() as served, ExitStack() as stack:
-        pages = [stack.enter_context(served.page(served.look).ws) for _ in range(64)]
+        pages = [stack.enter_context(served.page(served.look).ws) for _ in range(MAX_CLIENTS)]
         with pytest.raises(InvalidStatus) as error:
             served.socket("/ws/state", served.look)
         assert error.value.response.status_code == 503
@@ -512,7 +514,9 @@ def test_64_pages_are_served_and_one_more_is_told_so():
             while json.loads(ws.recv(PATIENCE_S)).get("t") != 7:
                 pass
         pages[0].close()
-        assert becomes(lambda: served.ask("/api/state", token=served.look).json["clients"] == 63)
+        assert becomes(
+            lambda: served.ask("/api/state", token=served.look).json["clients"] == MAX_CLIENTS - 1
+        )
         served.page().close()
 
 
