@@ -117,8 +117,7 @@ class AgentDevice:
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
     _dva_beats: Subscription | None = None
-    _findings: dict[int, m.EventReport] = field(default_factory=dict)  # the last of each event
-    _progress: tuple[int, str] = (0, "")  # of its order, as last said
+    _reports: dict[str, m.Body] = field(default_factory=dict)  # not taken yet, by their subject
     _turns: bool = False  # a registration with another DVA is in progress
 
     def __post_init__(self) -> None:
@@ -540,31 +539,14 @@ class AgentDevice:
         on_reply: Callable[[m.Reply], object] = do_nothing,
         on_failure: Callable[[], object] = do_nothing,
     ) -> None:
-        """Report a finding until a DVA records or refuses it: this one, or the next it comes to.
+        """Report a finding, until a DVA takes it or something newer was found there.
 
         Args:
             body: The finding.
             on_reply: Callback for the first reply.
             on_failure: Called if no reply to the first request arrives.
         """
-        event_id = body.event_id or 0
-        self._findings[event_id] = body
-        repeat = self._in_this_life(REPORT_AGAIN, self.report_finding, body)
-
-        def again() -> None:
-            if self._findings.get(event_id) is body:  # nothing else was found there since
-                repeat()
-
-        def answered(reply: m.Reply) -> None:
-            on_reply(reply)
-            if reply.code == m.BUSY:
-                again()
-
-        def unheard() -> None:
-            on_failure()
-            again()
-
-        self.ask(self.dva, body, answered, unheard)
+        self._report(f"finding {body.event_id}", body, on_reply, on_failure)
 
     def progress(
         self,
@@ -573,7 +555,7 @@ class AgentDevice:
         on_reply: Callable[[m.Reply], object] = do_nothing,
         on_failure: Callable[[], object] = do_nothing,
     ) -> None:
-        """Tell the DVA how an order stands, until one books it or the order stands differently.
+        """Report how an order stands, until a DVA takes it or it stands differently.
 
         Args:
             event_id: Event of the order.
@@ -581,35 +563,35 @@ class AgentDevice:
             on_reply: Callback for the first reply.
             on_failure: Called if no reply to the first request arrives.
         """
-        self._progress = event_id, state
-        repeat = self._in_this_life(REPORT_AGAIN, self.progress, event_id, state)
+        self._report("order", m.OrderProgress(event_id, state), on_reply, on_failure)
 
-        def again() -> None:
-            if self._progress == (event_id, state):
-                repeat()
+    def _report(
+        self,
+        subject: str,
+        body: m.Body,
+        on_reply: Callable[[m.Reply], object] = do_nothing,
+        on_failure: Callable[[], object] = do_nothing,
+    ) -> None:
+        """Ask the present DVA, then the next, to take a report, unless a newer one replaces it."""
+        self._reports[subject] = body
+        life = self._life
+
+        def repeat() -> None:
+            if life == self._life and self._reports.get(subject) is body:
+                self._report(subject, body)
 
         def answered(reply: m.Reply) -> None:
             on_reply(reply)
             if reply.code == m.BUSY:
-                again()
+                self.clock.call_after(REPORT_AGAIN, repeat)
+            elif self._reports.get(subject) is body:
+                del self._reports[subject]
 
         def unheard() -> None:
             on_failure()
-            again()
+            self.clock.call_after(REPORT_AGAIN, repeat)
 
-        self.ask(self.dva, m.OrderProgress(event_id, state), answered, unheard)
-
-    def _in_this_life(
-        self, delay: float, action: Callable[..., object], *args: object
-    ) -> Callable[[], None]:
-        """Return a callback that acts after a delay [s], unless the device restarts or leaves."""
-        life = self._life
-
-        def act() -> None:
-            if life == self._life:
-                action(*args)
-
-        return partial(self.clock.call_after, delay, act)
+        self.ask(self.dva, body, answered, unheard)
 
     def publish(self, topic: str, body: m.Body, to: str | None = None) -> None:
         """Publish a message to all subscribers; its header names the DVA or another receiver."""
