@@ -192,7 +192,8 @@ def test_a_peer_on_real_links_shows_up_and_its_faults_are_shown(joined, visit, t
     expect(message.get_by_role("group", name="XML of the request")).to_contain_text("<Level>")
     assert page.locator("table img").count() == 0
     page.get_by_role("link", name="Devices").click()
-    expect(page.get_by_role("row", name=HOSTILE)).to_contain_text(STRANGER)
+    devices = page.get_by_role("table", name="Devices")
+    expect(devices.get_by_role("row", name=HOSTILE)).to_contain_text(STRANGER)
     assert page.locator("table img").count() == 0
     page.get_by_role("link", name="Main").click()
     with page.expect_download() as download:

@@ -314,7 +314,7 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, running, visits):
     expect(other.page.get_by_text("is in your hands")).to_be_visible()
     other.calibrate()
     other.go("Teleoperation")
-    other.tap("Start")
+    other.start()
     hand.tilt(FORWARDS)
     other.tilt(LEFT_FORWARDS)
     expect(hand.status("Radius")).to_have_text("Radius: 0°")

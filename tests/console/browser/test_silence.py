@@ -142,7 +142,7 @@ def test_on_a_network_that_falls_silent_nothing_stands_as_if_it_were_live(
     is_small = name.startswith(("phone", "guard"))
     page = visits(**HAND if is_small else {"width": 1440, "height": 900}).tab()
     opened(page, cut, at, name)
-    assert page.locator("[data-stale]").count() == 0
+    expect(page.locator("[data-stale]")).to_have_count(0)  # a busy machine may be late for once
     cut.now()
     texts = page.evaluate(TEXTS, list(PAGES[name]))
     print(name, texts)
