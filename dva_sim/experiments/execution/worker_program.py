@@ -15,14 +15,14 @@ from contextlib import suppress
 
 def serve(number: int) -> None:
     """Run tasks from a socket until the other end closes it."""
-    with socket.socket(fileno=number) as channel, channel.makefile("rwb") as file:
+    gone = suppress(EOFError, ConnectionError, MemoryError)  # what was not sent is lost with it
+    with gone, socket.socket(fileno=number) as channel, channel.makefile("rwb") as file:
         threading.Thread(target=_end_with_parent, args=(number,), daemon=True).start()
-        with suppress(EOFError, ConnectionError, MemoryError):
-            sys.path[:] = pickle.load(file)
-            while True:
-                answer = pickle.load(file)()
-                file.write(pickle.dumps(answer))
-                file.flush()
+        sys.path[:] = pickle.load(file)
+        while True:
+            answer = pickle.load(file)()
+            file.write(pickle.dumps(answer))
+            file.flush()
 
 
 def _end_with_parent(number: int) -> None:

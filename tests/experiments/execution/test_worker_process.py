@@ -1,13 +1,16 @@
 """Processes that make runs, and what they have to do with the one that started them: nothing."""
 
 import os
+import pickle
 import signal
+import socket
 import sys
 from functools import partial
 
 import pytest
 from helpers.wording import unnamed
 
+from dva_sim.experiments.execution import worker_program
 from dva_sim.experiments.execution.executors import LocalProcesses, WorkerDied, WorkerProcess
 from dva_sim.kernel.errors import ConfigError
 
@@ -27,6 +30,14 @@ def test_a_worker_finds_modules_where_its_parent_does_and_ignores_ctrl_c(worker)
         pid = pool.submit(os.getpid).result()
         os.kill(pid, signal.SIGINT)
         assert pool.submit(os.getpid).result() == pid
+
+
+def test_a_worker_whose_parent_has_died_before_its_answer_ends_without_a_word(monkeypatch):
+    monkeypatch.setattr(worker_program, "_end_with_parent", lambda _: None)  # it is too late
+    ours, theirs = socket.socketpair()
+    ours.sendall(pickle.dumps(sys.path) + pickle.dumps(int))
+    ours.close()
+    worker_program.serve(theirs.detach())
 
 
 @pytest.mark.parametrize("task", [partial(os._exit, 0), partial(exec, "raise SystemExit")])
