@@ -2,13 +2,14 @@
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 from helpers.console.changed_lines import sockets_of
 from helpers.console.console_program import started
 from helpers.console.driving_page import start, take
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Page, expect
 
 SCENARIO = """\
@@ -287,7 +288,8 @@ def test_the_desk_needs_no_scrolling_aside_nor_for_its_main_buttons(address, vis
     panel(page).get_by_role("button", name=re.compile("^Send")).wait_for(timeout=1000 * PATIENCE_S)
     for name in ("Send", "Acknowledge", "False alarm", "Note"):  # in a control room none is below
         button = panel(page).get_by_role("button", name=re.compile(f"^{name}"))
-        assert width < 1024 or button.evaluate(IS_WHOLE), name
+        # While the machine is late, a line at the top says so, and moves all that is below.
+        assert width < 1024 or becomes(partial(button.evaluate, IS_WHOLE)), name
     panel(page).get_by_role("button", name="Shelve: Fire").click()
     for name in ("Event in hand", "Shift"):
         if name == "Shift":
