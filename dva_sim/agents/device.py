@@ -112,7 +112,7 @@ class AgentDevice:
     _refusal: str = ""  # last reported reason of a refused registration
     _life: int = 0  # number of restarts; repeated actions end with their life
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
-    _connected: set[str] = field(default_factory=set)  # peers that requests shall not wait for
+    _kept_open: set[str] = field(default_factory=set)  # peers with connections even if unused
     _addresses: dict[str, str] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
@@ -347,7 +347,7 @@ class AgentDevice:
 
     def connect(self, peer: str) -> None:
         """Connect to a peer now: over a long link the first request need not wait for that."""
-        self._connected.add(peer)
+        self._kept_open.add(peer)
         for urgent in (True, False):
             self._requester(peer, urgent).open()
 
@@ -367,7 +367,7 @@ class AgentDevice:
     def forget(self, peer: str) -> None:
         """Forget a peer that has left; open requests to it fail."""
         self.give_up(peer)
-        self._connected.discard(peer)
+        self._kept_open.discard(peer)
         self._addresses.pop(peer, None)
         self.network.forget(peer)
 
@@ -626,7 +626,7 @@ class AgentDevice:
     def _disconnect_unused(self, life: int) -> bool:
         """Close connections to peers of whom nothing was asked: they leave without a word."""
         for (peer, _), requester in self._requesters.items():
-            if peer not in self._connected:
+            if peer not in self._kept_open:
                 requester.rest()
         return life == self._life
 

@@ -546,6 +546,11 @@ class Reply:
     text: str
     content: Content | None = None
 
+    @property
+    def reason(self) -> str:
+        """Its text, or else the name of its code."""
+        return self.text or CODE_NAMES.get(self.code, str(self.code))
+
 
 Body = (
     Emergency

@@ -137,7 +137,7 @@ class HeldRobot:
                 on_result(True, f"{self.label} is yours")
             else:
                 self._be_gone()
-                why = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+                why = reply.reason
                 on_result(False, f"{self.label}: {why}")
 
         def unreachable() -> None:

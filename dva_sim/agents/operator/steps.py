@@ -186,8 +186,7 @@ def ask_emergency(device: AgentDevice, robot: str, session: int, on_result: OnRe
         if reply.code == m.OK:
             on_result(True, f"{label} has stopped")
         else:
-            why = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-            on_result(False, f"{label} has not stopped: {why}")
+            on_result(False, f"{label} has not stopped: {reply.reason}")
 
     def unanswered() -> None:
         on_result(False, f"{label} does not answer")

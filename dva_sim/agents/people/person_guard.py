@@ -222,7 +222,7 @@ class PersonGuard(OnFoot):
             later = "; the DVA cannot store that yet, so it is sent again"
             is_heard = reply.code in (m.OK, m.BUSY)
             text = done + (later if reply.code == m.BUSY else "")
-            on_result(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])
+            on_result(is_heard, text if is_heard else reply.reason)
 
         def unheard() -> None:
             on_result(False, "the DVA does not answer; it is sent again until it does")
@@ -232,9 +232,7 @@ class PersonGuard(OnFoot):
     def _ask(self, body: m.Body, done: str, on_result: OnResult) -> None:
         def answered(reply: m.Reply) -> None:
             ok = reply.code == m.OK
-            on_result(
-                ok, done if ok else reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-            )
+            on_result(ok, done if ok else reply.reason)
 
         unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
         self.device.ask(self.device.dva, body, answered, unreachable)

@@ -58,7 +58,7 @@ def revoke_permission(robot: str, label: str, ask: AskDva, on_result: OnResult) 
     """
 
     def answered(reply: m.Reply) -> None:
-        text = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+        text = reply.reason
         on_result(reply.code == m.OK, f"{label}: {text}")
 
     ask(m.Revoke(robot), answered, partial(unanswered, on_result))

@@ -21,7 +21,6 @@ from dva_sim.console.events.decisions import (
     decision_of,
     place_of,
     report_of,
-    why,
 )
 from dva_sim.console.events.handing_over import HandingOver
 from dva_sim.console.events.missions import SentRobots
@@ -123,7 +122,7 @@ class DecisionActions:
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
-                on_result(False, why(reply))
+                on_result(False, reply.reason)
                 return
             more = answer_of(reply, lambda device: device in self._system.robots())
             if isinstance(body, m.EventReport) and agent.raised is not None:

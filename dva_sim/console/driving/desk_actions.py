@@ -15,7 +15,7 @@ from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.driving.decision_actions import DecidingRooms, DecisionActions
 from dva_sim.console.driving.drive_actions import Driving
 from dva_sim.console.driving.driven_system import DrivenSystem
-from dva_sim.console.events.decisions import moment_ms, why
+from dva_sim.console.events.decisions import moment_ms
 from dva_sim.console.events.handing_over import Offer, client_named
 from dva_sim.console.views.event_details import details_shown
 from dva_sim.console.wire.arguments import DetailsAsked, HandOverAsked, OfferAnswered, TickAsked
@@ -207,7 +207,7 @@ class DeskActions:
         text = f"{words}: {offer.note}" if offer.note else words
 
         def answered(reply: m.Reply) -> None:
-            answers(reply.code == m.OK, why(reply))
+            answers(reply.code == m.OK, reply.reason)
 
         agent.ask(m.AddNote(number, text[:256]), answered, lambda: unanswered(answers))
 

@@ -75,7 +75,7 @@ class FakeDevices:
                 on_result(True, f"{device.label} is registered as {id_tag}", device=id_tag)
             else:
                 self._drop(device)
-                on_result(False, f"the DVA refuses it: {reply.text or m.CODE_NAMES[reply.code]}")
+                on_result(False, f"the DVA refuses it: {reply.reason}")
 
         def failed() -> None:
             self._drop(device)

@@ -107,11 +107,6 @@ def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]
     return report, f"{kind.replace('_', ' ')} is raised"
 
 
-def why(reply: m.Reply) -> str:
-    """Return why a reply refuses, in words."""
-    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-
-
 def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Answered:
     """Return what a page gets of a reply besides success: a proposal with its reasons."""
     proposal = reply.content

@@ -16,7 +16,6 @@ from dva_sim.agents.device import do_nothing
 from dva_sim.agents.observation import IN_VIEW
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
-from dva_sim.console.events.decisions import why
 from dva_sim.protocol import messages as m
 
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
@@ -73,7 +72,7 @@ class RobotMission:
                 self._get_permission(on_result)
             else:
                 self._put_away()
-                on_result(False, why(reply))
+                on_result(False, reply.reason)
 
         def unheard() -> None:
             self._put_away()
@@ -90,7 +89,7 @@ class RobotMission:
                 self._session = reply.content.session
                 self._start(on_result)
             else:
-                refused(why(reply))
+                refused(reply.reason)
 
         def refused(text: str) -> None:
             self._end("failed")
@@ -193,7 +192,7 @@ class RobotMission:
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
-                on_result(False, why(reply))
+                on_result(False, reply.reason)
                 return
             self._device.tell(f"{finding} event {number}", "event")
             self._end("done")

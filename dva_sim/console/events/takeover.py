@@ -13,7 +13,6 @@ from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.asking.refusal import OnResult, unanswered
-from dva_sim.console.events.decisions import why
 from dva_sim.console.wire.seats import Answered
 from dva_sim.protocol import messages as m
 
@@ -67,7 +66,7 @@ class Takeover:
 
     def _revoked(self, reply: m.Reply) -> None:
         if reply.code != m.OK:
-            self._on_result(False, why(reply))
+            self._on_result(False, reply.reason)
         elif self._event is None:
             self._ask_for_it()
         else:

@@ -9,7 +9,7 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
-from dva_sim.console.events.decisions import on_site, place_of, why
+from dva_sim.console.events.decisions import on_site, place_of
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.wire.actions import Asked
@@ -94,7 +94,7 @@ class GuardActions:
         def ask(agent: ControlRoomAgent, on_result: OnResult) -> None:
             def answered(reply: m.Reply) -> None:
                 ok = reply.code == m.OK
-                on_result(ok, f"you go to event {number}" if ok else why(reply))
+                on_result(ok, f"you go to event {number}" if ok else reply.reason)
 
             guard.wanted = number
             agent.ask(body, answered, partial(unanswered, on_result))

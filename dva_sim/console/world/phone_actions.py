@@ -13,7 +13,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
 from dva_sim.console.driving.drive_actions import Driving
-from dva_sim.console.events.decisions import place_of, report_of, why
+from dva_sim.console.events.decisions import place_of, report_of
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.actions import Asked
@@ -125,7 +125,7 @@ class PhoneActions:
                 on_result(True, f"{label} is registered", phone=phone.identity())
             else:
                 self._retire(client, phone)
-                on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                on_result(False, reply.reason)
 
         def unreachable() -> None:
             if phone.person is person:
@@ -171,7 +171,7 @@ class PhoneActions:
 
         def answered(reply: m.Reply) -> None:
             if not isinstance(reply.content, m.DeviceList):
-                on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                on_result(False, reply.reason)
                 return
             known = self._world.system.state.devices.values()
             devices = [_shown(one) for one in reply.content.devices]
@@ -209,7 +209,7 @@ class PhoneActions:
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
-                on_result(False, why(reply))
+                on_result(False, reply.reason)
             elif isinstance(reply.content, m.EventStatus):
                 on_result(True, done, event=reply.content.event_id)
             else:

@@ -272,11 +272,12 @@ class RegionalDvaAgent(DvaAgent):
         division = self._regional.division
         for deputy, held in self._held_by.items():
             for number, event in list(held.items()):
+                if number in self._copied or (event.open and number not in self._missed):
+                    continue
                 region = division.region_at(event.position)
-                is_due = not event.open or number in self._missed
                 if division.claims[region].dva != division.own:
                     del held[number]  # another DVA goes on with it
-                elif is_due and number not in self._copied and self._is_deputy(deputy, region):
+                elif self._is_deputy(deputy, region):
                     self._replicate(event)
 
     def _is_deputy(self, peer: str, region: str) -> bool:
