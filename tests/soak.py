@@ -114,7 +114,7 @@ def begun(programs: Programs, hours: float) -> Soak:
     }
     for name, program in (("live", live), ("console", console)):
         doors[f"ros {name}"] = lambda p=program: RosVisitor(address(p, "rosbridge"))
-        doors[f"viewer {name}"] = lambda p=program: Viewer(address(p, "Foxglove"))
+        doors[f"viewer {name}"] = lambda p=program: Viewer(address(p, "Foxglove"), keeps=1)
     return Soak(programs, live, console, Visitors(doors))
 
 

@@ -7,6 +7,7 @@ References:
 import contextlib
 import json
 import threading
+from collections import deque
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -17,14 +18,20 @@ MESSAGE_DATA, TIME = 1, 2
 class Viewer:
     """Subscribes to channels by topic as soon as they are advertised.
 
+    Args:
+        url: Address of the server.
+        wants: Topics that are subscribed to.
+        keeps: Number of messages that are kept of each topic; None: all.
+
     Attributes:
         channels: All that were advertised, by topic.
         came: Time [ns] and content of each message, by topic.
         times: Times of the server [ns].
     """
 
-    def __init__(self, url: str, wants=lambda topic: True) -> None:
+    def __init__(self, url: str, wants=lambda topic: True, keeps: int | None = None) -> None:
         self.channels, self.came, self.times, self.info = {}, {}, [], {}
+        self._keeps = keeps
         self._wants, self._topics = wants, {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(url,), daemon=True)
@@ -40,7 +47,8 @@ class Viewer:
                     elif data[0] == MESSAGE_DATA:
                         topic = self._topics[int.from_bytes(data[1:5], "little")]
                         time = int.from_bytes(data[5:13], "little")
-                        self.came.setdefault(topic, []).append((time, data[13:]))
+                        came = self.came.setdefault(topic, deque(maxlen=self._keeps))
+                        came.append((time, data[13:]))
                     elif data[0] == TIME:
                         self.times.append(int.from_bytes(data[1:9], "little"))
 
