@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,11 +136,11 @@ class Roadmap:
         self._turn = np.array([[cos, -sin], [sin, cos]]) / grid.resolution
         self._clearances = room.ravel()
         # What is asked for again is kept; ways and lengths by start and goal [m].
-        self.around = lru_cache(KEPT_MAPS)(self._around)
-        self.way = lru_cache(KEPT_PATHS)(self._way)
-        self.length = lru_cache(KEPT_PATHS)(self._length)
+        self.around = _cached(self, Roadmap._around, KEPT_MAPS)
+        self.way = _cached(self, Roadmap._way, KEPT_PATHS)
+        self.length = _cached(self, Roadmap._length, KEPT_PATHS)
         kept = min(KEPT_FIELDS, max(1, kept_nodes // self._room.size))
-        self._field_of = lru_cache(kept)(self._field)
+        self._field_of = _cached(self, Roadmap._field, kept)
 
     def _around(self, discs: tuple[Disc, ...]) -> Roadmap:
         """Return the roadmap of the floor with some obstacles on it."""
@@ -272,6 +273,19 @@ class Roadmap:
             good = new >= np.minimum(0.9 * room[these], self._clearance + SPARE)
             points[these[good]] = moved[good]
         return points
+
+
+R = TypeVar("R")
+
+
+def _cached(roadmap: Roadmap, method: Callable[..., R], most: int) -> Callable[..., R]:
+    """Return a method that caches its last results.
+
+    A cache of the bound method would form a cycle with the roadmap, and 44 MB of a campus would
+    stay until the next full collection of garbage, which a live run makes rarely.
+    """
+    owner = weakref.ref(roadmap)
+    return lru_cache(most)(lambda *args: method(owner(), *args))
 
 
 def _both_ways(graph: Any) -> Any:

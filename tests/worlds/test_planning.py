@@ -1,5 +1,7 @@
+import gc
 import itertools
 import math
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid
-from dva_sim.worlds.planning import KEPT_AROUND, Disc, Planner
+from dva_sim.worlds.planning import KEPT_AROUND, KEPT_MAPS, Disc, Planner
 from dva_sim.worlds.site import FOOTPRINT, load_site, map_site
 
 MAPS = TESTS / "data"
@@ -132,6 +134,21 @@ def test_of_a_map_with_obstacles_few_fields_are_kept():
     kept = around._field_of.cache_info()
     assert kept.misses > kept.currsize > 0
     assert kept.currsize * around._room.size <= KEPT_AROUND
+
+
+def test_maps_with_obstacles_that_are_no_longer_cached_are_freed_at_once():
+    roadmap = Planner(hall(20, 20), 0.3)._roadmap
+    gc.disable()
+    try:
+        maps = [
+            weakref.ref(roadmap.around((Disc(5.0, 5.0 + 0.1 * n, 0.4),)))
+            for n in range(KEPT_MAPS + 3)
+        ]
+        for each in maps[-KEPT_MAPS:]:
+            each().way((2.0, 2.0), (8.0, 8.0))
+        assert [each() is not None for each in maps] == [False] * 3 + [True] * KEPT_MAPS
+    finally:
+        gc.enable()
 
 
 def test_who_stands_in_the_only_door_leaves_no_way_and_one_beside_the_plan_changes_nothing():
